@@ -92,6 +92,23 @@ pub enum ArmError {
         /// The controller's words, without the asterisks.
         message: String,
     },
+    /// The controller refused a step of a text of programs. Nothing was changed.
+    #[error(
+        "{port}: line {line} of the text, `{step}`, was refused by the controller{}: *{message}*",
+        .word.as_ref().map(|word| format!(" at `{word}`")).unwrap_or_default()
+    )]
+    Step {
+        /// The line to the controller.
+        port: String,
+        /// Number of the line of the text, from 1.
+        line: usize,
+        /// Step that was typed.
+        step: String,
+        /// First word of the step, if the controller does not know it.
+        word: Option<String>,
+        /// The controller's words, without the asterisks.
+        message: String,
+    },
     /// The arm stands, but not where it was sent.
     #[error(
         "{port}: {joint} was sent to {wanted_degrees:.3} degrees but reports {reported_degrees:.3}"

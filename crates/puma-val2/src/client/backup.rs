@@ -1,6 +1,6 @@
 //! Everything in the controller's memory as text, and back.
 
-use crate::client::programs::check_line;
+use crate::client::programs::{check_line, name_of};
 use crate::client::reader::Ending;
 use crate::client::val2_client::Val2Client;
 use crate::error::ArmError;
@@ -9,11 +9,26 @@ use crate::transport::Transport;
 /// Contents of a controller, or of a backup of one: names and their values, in order.
 #[derive(Debug, Default, PartialEq)]
 struct Contents {
-    /// Programs and their steps.
-    programs: Vec<(String, Vec<String>)>,
+    programs: Vec<(String, Body)>,
     /// Locations; the name of a precision point begins with `#`.
     places: Vec<(String, [f64; 6])>,
     reals: Vec<(String, f64)>,
+}
+
+/// A program without its name.
+#[derive(Debug, Default)]
+struct Body {
+    /// Parameters in brackets, or nothing.
+    parameters: String,
+    steps: Vec<String>,
+    /// Number of the line of a text that begins the program.
+    line: usize,
+}
+
+impl PartialEq for Body {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.parameters, &self.steps) == (&other.parameters, &other.steps)
+    }
 }
 
 /// Name of the program of this number while the programs of a backup are typed.
@@ -35,8 +50,13 @@ impl<T: Transport> Val2Client<T> {
     fn contents(&mut self) -> Result<Contents, ArmError> {
         let mut contents = Contents::default();
         for name in self.programs()? {
-            let steps = self.program(&name)?;
-            contents.programs.push((name, steps));
+            let (head, steps) = self.listed(&name)?;
+            let body = Body {
+                parameters: head[name_of(&head).len()..].to_owned(),
+                steps,
+                line: 0,
+            };
+            contents.programs.push((name, body));
         }
         for line in self.listing("LISTL")? {
             let mut words = line.split_whitespace();
@@ -76,8 +96,8 @@ impl<T: Transport> Val2Client<T> {
     /// # Errors
     /// [`ArmError::Text`] for a text that is no backup; [`ArmError::Conflict`] unless `replace`, if
     /// the controller holds other contents of the same name; both before anything is changed.
-    /// [`ArmError::Refused`] for a step that the controller does not take; otherwise errors of the
-    /// line.
+    /// [`ArmError::Step`] for a step that the controller does not take, by its line; otherwise
+    /// errors of the line.
     pub fn restore(&mut self, text: &str, replace: bool) -> Result<Vec<String>, ArmError> {
         let wanted = Contents::parse(text)?;
         let plan = plan(&wanted, &self.contents()?);
@@ -89,16 +109,28 @@ impl<T: Transport> Val2Client<T> {
                 names: names.join(", "),
             });
         }
+        self.delete_scratch()?;
+        if let Err(error) = self.store_all(&wanted, &plan) {
+            // A line that is gone cannot take the unfinished programs away either.
+            let _ = self.delete_scratch();
+            return Err(error);
+        }
+        let missing = self.restore_plan(text)?;
+        let missing = missing.iter().find(|line| !line.starts_with("keep "));
+        match missing {
+            None => Ok(plan),
+            Some(name) => Err(self.wire.garbled("LISTP", "all of the backup", name)),
+        }
+    }
+
+    fn store_all(&mut self, wanted: &Contents, plan: &[String]) -> Result<(), ArmError> {
         let changes = |kind: &str, name: &str| !plan.contains(&format!("keep {kind} {name}"));
         let programs = wanted.programs.iter().filter(|p| changes("program", &p.0));
         let programs: Vec<_> = programs.collect();
-        for (i, (_, steps)) in programs.iter().enumerate() {
-            if let Err(error) = self.type_program(&scratch(i), steps) {
-                // A line that is gone cannot take the unfinished programs away either.
-                let deleted = (0..=i).map(|i| self.delete('P', &scratch(i)));
-                let _ = deleted.filter(Result::is_err).count();
-                return Err(error);
-            }
+        for (i, (_, body)) in programs.iter().enumerate() {
+            let head = format!("{}{}", scratch(i), body.parameters);
+            let typed = self.type_program(&head, &body.steps);
+            typed.map_err(|error| body.located(error))?;
         }
         for (name, values) in &wanted.places {
             if changes("location", name) {
@@ -113,12 +145,7 @@ impl<T: Transport> Val2Client<T> {
         for (i, (name, _)) in programs.iter().enumerate() {
             self.put_in_place(name, &scratch(i))?;
         }
-        let missing = self.restore_plan(text)?;
-        let missing = missing.iter().find(|line| !line.starts_with("keep "));
-        match missing {
-            None => Ok(plan),
-            Some(name) => Err(self.wire.garbled("LISTP", "all of the backup", name)),
-        }
+        Ok(())
     }
 
     /// Deletes what has this name: a program, a location or a real variable.
@@ -222,9 +249,8 @@ fn plan(wanted: &Contents, held: &Contents) -> Vec<String> {
             format!("{word} {kind} {name}")
         })
     }
-    let steps = |a: &Vec<String>, b: &Vec<String>| a == b;
     let real = |a: &f64, b: &f64| (a - b).abs() <= 1e-4;
-    lines("program", &wanted.programs, &held.programs, steps)
+    lines("program", &wanted.programs, &held.programs, Body::eq)
         .chain(lines("location", &wanted.places, &held.places, near))
         .chain(lines("real", &wanted.reals, &held.reals, real))
         .collect()
@@ -233,9 +259,9 @@ fn plan(wanted: &Contents, held: &Contents) -> Vec<String> {
 impl Contents {
     fn text(&self) -> String {
         let mut text = String::new();
-        for (name, steps) in &self.programs {
-            text.push_str(&format!(".PROGRAM {name}\n"));
-            for step in steps {
+        for (name, body) in &self.programs {
+            text.push_str(&format!(".PROGRAM {name}{}\n", body.parameters));
+            for step in &body.steps {
                 text.push_str(&format!(" {step}\n"));
             }
             text.push_str(".END\n");
@@ -273,16 +299,22 @@ impl Contents {
             if upper == ".END" && !section.is_empty() {
                 section.clear();
             } else if section == ".PROGRAM" {
-                if let Some((_, steps)) = contents.programs.last_mut() {
+                if let Some((_, body)) = contents.programs.last_mut() {
                     check_line("a step of a program", line).map_err(|_| wrong("is no step"))?;
-                    steps.push(line.to_owned());
+                    body.steps.push(line.to_owned());
                 }
             } else if section.is_empty() {
                 let (head, name) = upper.split_once(' ').unwrap_or((&upper, ""));
                 match (head, name.trim()) {
                     ("", _) => continue,
-                    (".PROGRAM", name) if is_name(name) => {
-                        contents.programs.push((name.to_owned(), Vec::new()));
+                    (".PROGRAM", head) if is_head(head) => {
+                        let parameters = head[name_of(head).len()..].replace(' ', "");
+                        let body = Body {
+                            parameters: parameters.replace("()", ""),
+                            steps: Vec::new(),
+                            line: index + 1,
+                        };
+                        contents.programs.push((name_of(head).to_owned(), body));
                     }
                     (".LOCATIONS" | ".REALS", "") => {}
                     _ => return Err(wrong("begins no program, locations or reals")),
@@ -316,6 +348,33 @@ impl Contents {
     }
 }
 
+impl Body {
+    /// Returns the error of a step with the number of its line.
+    fn located(&self, error: ArmError) -> ArmError {
+        let ArmError::Refused {
+            port,
+            sent,
+            message,
+        } = &error
+        else {
+            return error;
+        };
+        let Some(at) = self.steps.iter().position(|step| step == sent) else {
+            return error;
+        };
+        let mut words = sent.split_whitespace();
+        let first = words.find(|word| word.parse::<u32>().is_err());
+        let unknown = message.to_ascii_uppercase().contains("INSTRUCTION");
+        ArmError::Step {
+            port: port.clone(),
+            line: self.line + 1 + at,
+            step: sent.clone(),
+            word: first.filter(|_| unknown).map(str::to_owned),
+            message: message.clone(),
+        }
+    }
+}
+
 /// Parses a finite number; words are refused.
 fn number(text: &str) -> Option<f64> {
     let value: f64 = text.trim().parse().ok()?;
@@ -326,4 +385,14 @@ fn number(text: &str) -> Option<f64> {
 fn is_name(name: &str) -> bool {
     let letter = |c: char| c.is_ascii_alphanumeric() || "._[]".contains(c);
     name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(letter)
+}
+
+/// Returns `true` for the name of a program, possibly with names in brackets.
+fn is_head(head: &str) -> bool {
+    let Some((name, parameters)) = head.split_once('(') else {
+        return is_name(head);
+    };
+    let parameters = parameters.strip_suffix(')').map(str::trim);
+    is_name(name.trim())
+        && parameters.is_some_and(|p| p.is_empty() || p.split(',').all(|p| is_name(p.trim())))
 }

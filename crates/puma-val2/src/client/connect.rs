@@ -113,7 +113,10 @@ impl<T: Transport> Val2Client<T> {
                     return Err(ArmError::Silence {
                         port: self.wire.port(),
                         sent: "CR".to_owned(),
-                        expected: format!("{expected} (limit: `connect_timeout`)"),
+                        expected: format!(
+                            "{expected} (limit: `connect_timeout`; off, another baud rate, or \
+                             another program on the line?)"
+                        ),
                         heard,
                         waited: timeout,
                     });

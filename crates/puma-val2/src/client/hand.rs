@@ -59,18 +59,16 @@ impl<T: Transport> Val2Client<T> {
     /// Commands a motion of the hand: in one line where its echo is checked, otherwise as a point
     /// whose display is checked.
     fn send_hand(&mut self, hand: &Xyzoat, word: &str, limit: Duration) -> Result<(), Failed> {
+        if !self.wire.checks_echo() {
+            let name = self.wire.config.point_name.clone();
+            return self.move_to_point(word, &name, hand.val(), None, limit);
+        }
         let move_to_pose = format!("{word} TRANS({})", hand.val().map(plain).join(","));
         if let Some(signal) = self.guard {
             return self.run_guarded_once(signal, &[move_to_pose], limit);
         }
-        if self.wire.checks_echo() {
-            let line = format!("DO {move_to_pose}");
-            self.command_once(&line, limit).map(drop)
-        } else {
-            let name = self.wire.config.point_name.clone();
-            self.define_place(&name, hand.val())?;
-            self.move_to_point(word, &name, limit)
-        }
+        self.command_once(&format!("DO {move_to_pose}"), limit)
+            .map(drop)
     }
 }
 

@@ -99,6 +99,11 @@ impl<T: Transport> Val2Client<T> {
         self.absolute(target, means)
     }
 
+    /// Returns the name of the precision point of the moves.
+    pub(super) fn goal(&self) -> String {
+        format!("#{}", self.wire.config.point_name)
+    }
+
     fn coordinated(&self) -> Means {
         match self.wire.config.way {
             _ if self.guard.is_some() => Means::Guarded(None),
@@ -293,14 +298,9 @@ impl<T: Transport> Val2Client<T> {
                 let line = format!("DO MOVE #PPOINT({})", target.degrees().map(plain).join(","));
                 self.command_once(&line, limit).map(drop)
             }
-            Means::Point => {
-                self.define_goal(&target)?;
-                let name = format!("#{}", self.wire.config.point_name);
-                self.move_to_point("MOVE", &name, limit)
-            }
+            Means::Point => self.move_to_point("MOVE", &self.goal(), target.degrees(), None, limit),
             Means::Guarded(speed) => {
-                self.define_goal(&target)?;
-                self.run_guarded(speed, limit)
+                self.move_to_point("MOVE", &self.goal(), target.degrees(), speed, limit)
             }
             Means::Ready => self.command_once("DO READY", limit).map(drop),
         }

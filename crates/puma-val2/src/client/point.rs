@@ -1,10 +1,13 @@
-//! Points typed to the controller and compared with its display.
+//! Points typed to the controller, compared with its display, and moved to.
 
+use std::time::Duration;
+
+use crate::client::dialogue::RESIDENT_QUESTION;
 use crate::client::hand::apart;
 use crate::client::reader::Ending;
 use crate::client::val2_client::Val2Client;
+use crate::client::wire::{Failed, Reply};
 use crate::error::ArmError;
-use crate::joints::Joints;
 use crate::kinematics::xyzoat::Xyzoat;
 use crate::transport::Transport;
 
@@ -14,42 +17,30 @@ type Shown = [(f64, f64); 6];
 /// Test of the values displayed against the values meant.
 type Fits<'a> = &'a dyn Fn(&Shown) -> bool;
 
-impl<T: Transport> Val2Client<T> {
-    /// Defines the precision point that the client moves to.
-    pub(super) fn define_goal(&mut self, target: &Joints) -> Result<(), ArmError> {
-        let name = format!("#{}", self.wire.config.point_name);
-        self.define_place(&name, target.degrees())
-    }
+/// Program that moves to a point where nothing is echoed.
+const GOAL: &str = "PGMOVE";
 
+/// Answer that makes a program of [`shown_first`] move the arm.
+const GO: &str = "7";
+
+impl<T: Transport> Val2Client<T> {
     /// Defines a location: a precision point if its name begins with `#`, otherwise a pose.
     pub(super) fn define_place(&mut self, name: &str, values: [f64; 6]) -> Result<(), ArmError> {
-        if name.starts_with('#') {
-            return self.define_point(name, values, &|shown| same(shown, values));
-        }
-        let pose = Xyzoat::from_val(values).pose();
-        self.define_point(name, values, &|shown| {
-            let shown = Xyzoat::from_val(shown.map(|(value, _)| value));
-            let (off, turned) = apart(&pose, &shown.pose());
-            off < 2e-5 && turned < 0.02
-        })
+        self.define_point(name, values, !self.wire.checks_echo())
     }
 
     /// Types `POINT name`, the values and an empty line, and compares the display with the values.
-    fn define_point(
-        &mut self,
-        name: &str,
-        values: [f64; 6],
-        fits: Fits<'_>,
-    ) -> Result<(), ArmError> {
+    ///
+    /// Where nothing is echoed the name may have been damaged, or a value and its display by the
+    /// same bit. A point that is not shown by the program that moves to it is shown `again`.
+    fn define_point(&mut self, name: &str, values: [f64; 6], again: bool) -> Result<(), ArmError> {
+        let fits = fits(name, values);
         for tries in 0.. {
-            let mut outcome = self.define_point_once(name, values, fits);
-            // Where nothing is echoed the name may have been damaged, or a value and its display by
-            // the same bit: the point is shown again.
-            let proven = self.wire.checks_echo();
+            let mut outcome = self.define_point_once(name, values, &fits);
             if let Ok(shown) = outcome
-                && !proven
+                && again
             {
-                outcome = self.show_point(name, fits).map(|()| shown);
+                outcome = self.show_point(name, &fits).map(|()| shown);
             }
             match outcome {
                 Ok(shown) => {
@@ -64,6 +55,61 @@ impl<T: Transport> Val2Client<T> {
             }
         }
         Ok(())
+    }
+
+    /// Defines a location and moves there by `word`, `MOVE` or `MOVES`, under guard if one is
+    /// armed, at `speed` percent of the monitor's speed.
+    ///
+    /// Without an echo a damaged name could be that of a point that another damaged line has made.
+    /// There a stored program, whose listing has been compared, shows the point and moves to it.
+    pub(super) fn move_to_point(
+        &mut self,
+        word: &str,
+        name: &str,
+        values: [f64; 6],
+        speed: Option<f64>,
+        limit: Duration,
+    ) -> Result<(), Failed> {
+        self.define_point(name, values, false)?;
+        let motion = format!("{word} {name}");
+        let shows = !self.wire.checks_echo();
+        let program = if self.guard.is_some() {
+            self.guarding(speed, &motion)?
+        } else if shows {
+            if self.goal_program.as_ref() != Some(&motion) {
+                self.goal_program = None;
+                self.type_program(GOAL, &shown_first(&motion))?;
+                self.goal_program = Some(motion);
+            }
+            GOAL
+        } else {
+            return self.command_once(&format!("DO {motion}"), limit).map(drop);
+        };
+        let mut line = format!("EXECUTE {program}");
+        if shows {
+            let patience = self.wire.config.patience();
+            let reply = self.wire.exchange_to_end(&line, patience);
+            // Nothing moves before the answer.
+            let reply = reply.map_err(ArmError::from)?;
+            if !self
+                .shown(&line, &reply)?
+                .is_some_and(|shown| fits(name, values)(&shown))
+            {
+                let expected = "the values just defined displayed";
+                return Err(self.wire.garbled(&line, expected, &reply.text).into());
+            }
+            line = GO.to_owned();
+        }
+        self.run(&line, limit).map(drop)
+    }
+
+    /// Returns the steps of a motion to a point, for a program.
+    pub(super) fn steps_to_point(&self, motion: &str) -> Vec<String> {
+        if self.wire.checks_echo() {
+            vec![motion.to_owned()]
+        } else {
+            shown_first(motion)
+        }
     }
 
     fn define_point_once(
@@ -104,7 +150,12 @@ impl<T: Transport> Val2Client<T> {
     /// Types a line of the dialogue and returns the values displayed.
     pub(super) fn ask_point(&mut self, typed: &str) -> Result<Option<Shown>, ArmError> {
         let reply = self.say(typed)?;
-        self.without_message(typed, &reply)?;
+        self.shown(typed, &reply)
+    }
+
+    /// Returns the values of a reply that ends with a question.
+    fn shown(&self, typed: &str, reply: &Reply) -> Result<Option<Shown>, ArmError> {
+        self.without_message(typed, reply)?;
         if reply.ending != Ending::Question {
             let expected = "a question for changes";
             return Err(self.wire.garbled(typed, expected, &reply.text));
@@ -116,6 +167,37 @@ impl<T: Transport> Val2Client<T> {
     pub(super) fn leave_point(&mut self) -> Result<(), ArmError> {
         let left = self.command_once("", self.wire.config.patience());
         left.map(drop).map_err(ArmError::from)
+    }
+}
+
+/// Returns the steps that show the place of `motion` and go there after [`GO`]. A damaged answer
+/// makes them ask again.
+fn shown_first(motion: &str) -> Vec<String> {
+    let name = motion.rsplit(' ').next().unwrap_or_default();
+    [
+        &format!("DECOMPOSE PGQ[1] = {name}"),
+        "TYPE /F1.3,PGQ[1],PGQ[2],PGQ[3],PGQ[4],PGQ[5],PGQ[6]",
+        &format!("10 PROMPT \"{RESIDENT_QUESTION}\",PGK"),
+        "IF PGK <> 7 AND PGK <> 914 GOTO 10",
+        "IF PGK == 7 THEN",
+        motion,
+        "END",
+    ]
+    .map(str::to_owned)
+    .to_vec()
+}
+
+/// Returns the test of a display of the place `name` that was given these values.
+fn fits(name: &str, values: [f64; 6]) -> impl Fn(&Shown) -> bool {
+    let is_point = name.starts_with('#');
+    let pose = Xyzoat::from_val(values).pose();
+    move |shown| {
+        if is_point {
+            return same(shown, values);
+        }
+        let shown = Xyzoat::from_val(shown.map(|(value, _)| value));
+        let (off, turned) = apart(&pose, &shown.pose());
+        off < 2e-5 && turned < 0.02
     }
 }
 

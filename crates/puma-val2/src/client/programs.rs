@@ -78,11 +78,19 @@ impl<T: Transport> Val2Client<T> {
     /// [`ArmError::Setting`] for a name that is not one line of printable characters;
     /// [`ArmError::Refused`] if there is no such program; otherwise errors of the line.
     pub fn program(&mut self, name: &str) -> Result<Vec<String>, ArmError> {
+        Ok(self.listed(name)?.1)
+    }
+
+    /// Returns the head of a program, its name and its parameters in brackets, and its steps.
+    pub(super) fn listed(&mut self, name: &str) -> Result<(String, Vec<String>), ArmError> {
         check_line("the name of a program", name)?;
         let lines = self.listing(&format!("LISTP {name}"))?;
+        let head = lines.iter().find_map(|line| line.strip_prefix(".PROGRAM "));
+        let head = head.unwrap_or(name).trim().to_ascii_uppercase();
         // `.PROGRAM NAME` and `.END` are not steps.
         let steps = lines.iter().filter(|line| !line.starts_with('.'));
-        Ok(steps.map(|line| without_number(line).to_owned()).collect())
+        let steps = steps.map(|line| without_number(line).to_owned());
+        Ok((head, steps.collect()))
     }
 
     /// Stores a program. One of the same name is replaced, but only after the new one has been
@@ -100,7 +108,7 @@ impl<T: Transport> Val2Client<T> {
         }
         if let Err(error) = self.type_program(NEW, steps) {
             // A line that is gone cannot take the unfinished program away either.
-            let _ = self.delete('P', NEW);
+            let _ = self.delete_scratch();
             return Err(error);
         }
         self.put_in_place(name, NEW)
@@ -111,18 +119,45 @@ impl<T: Transport> Val2Client<T> {
     pub(super) fn put_in_place(&mut self, name: &str, new: &str) -> Result<(), ArmError> {
         let known = self.programs()?;
         let is_there = |wanted: &str| known.iter().any(|name| name.eq_ignore_ascii_case(wanted));
-        if is_there(name) {
-            if is_there(OLD) {
-                self.delete('P', OLD)?;
+        let mut old = OLD.to_owned();
+        for number in 1.. {
+            if !is_there(&old) {
+                break;
             }
-            self.rename(OLD, name)?;
+            // It may be the only copy of what an interrupted call has replaced.
+            let notice = format!("{old} is a program that an interrupted replacement has left");
+            self.wire.notices.push(notice);
+            old = format!("{OLD}{number}");
         }
-        if let Err(error) = self.rename(name, new) {
-            let _ = self.rename(name, OLD);
-            return Err(error);
+        if !is_there(name) {
+            return self.rename(name, new);
         }
-        if is_there(name) {
-            self.delete('P', OLD)?;
+        let replaced = self
+            .rename(&old, name)
+            .and_then(|()| self.rename(name, new));
+        if replaced.is_err() {
+            let _ = self.wire.settle().and_then(|_| self.rename(name, &old));
+            return replaced;
+        }
+        let mut deleted = self.delete('P', &old);
+        if deleted.is_err() {
+            deleted = self.wire.settle().and_then(|_| self.delete('P', &old));
+        }
+        deleted
+    }
+
+    /// Deletes the programs that were being typed when a call failed.
+    pub(super) fn delete_scratch(&mut self) -> Result<(), ArmError> {
+        self.wire.settle()?;
+        // Not by a listing, which may take half an hour.
+        let reply = self.say("DIRECTORY")?;
+        self.without_message("DIRECTORY", &reply)?;
+        let lines = lines_said(&reply.text, "DIRECTORY");
+        for name in lines.iter().flat_map(|line| line.split_whitespace()) {
+            let number = name.strip_prefix("PGN");
+            if name == NEW || number.is_some_and(|n| n.parse::<u32>().is_ok()) {
+                self.delete('P', name)?;
+            }
         }
         Ok(())
     }
@@ -163,31 +198,31 @@ impl<T: Transport> Val2Client<T> {
     }
 
     /// Types a program into the controller's editor, replaces one of the same name, and compares
-    /// the listing.
-    pub(super) fn type_program(&mut self, name: &str, steps: &[String]) -> Result<(), ArmError> {
+    /// the listing. The name may have parameters in brackets.
+    pub(super) fn type_program(&mut self, head: &str, steps: &[String]) -> Result<(), ArmError> {
         let mut tries = 0;
         loop {
-            match self.store_once(name, steps) {
-                Err(error) if is_doubt(&error) || matches!(error, ArmError::Refused { .. }) => {
-                    // Out of the editor in any case.
-                    self.wire.settle()?;
-                    if tries >= self.wire.config.retries || !self.is_doubtful(&error) {
-                        return Err(error);
-                    }
-                    tries += 1;
-                }
-                outcome => return outcome,
+            let Err(error) = self.store_once(head, steps) else {
+                return Ok(());
+            };
+            // Out of the editor in any case.
+            let left = self.wire.settle();
+            if tries >= self.wire.config.retries || !self.is_doubtful(&error) {
+                return Err(error);
             }
+            left?;
+            tries += 1;
         }
     }
 
-    fn store_once(&mut self, name: &str, steps: &[String]) -> Result<(), ArmError> {
+    fn store_once(&mut self, head: &str, steps: &[String]) -> Result<(), ArmError> {
+        let name = name_of(head);
         // An old program of this name, if there is one; that there is none is no fault.
         if self.say(&format!("DELETEP {name}"))?.ending == Ending::Question {
             self.say("Y")?;
         }
         // Steps belong into the editor: at the monitor some of them would be carried out.
-        let edit = format!("EDIT {name}");
+        let edit = format!("EDIT {head}");
         for line in std::iter::once(&edit).chain(steps) {
             let reply = self.say(line)?;
             self.without_message(line, &reply)?;
@@ -198,7 +233,7 @@ impl<T: Transport> Val2Client<T> {
         self.say("E")?;
         let listed = self.say(&format!("LISTP {name}"))?.text;
         let listed = listed.to_ascii_uppercase();
-        if holds(&listed, steps) {
+        if holds(&listed, steps) && (name == head || listed.contains(head)) {
             return Ok(());
         }
         Err(self
@@ -274,6 +309,11 @@ pub(super) fn check_line(what: &'static str, text: &str) -> Result<(), ArmError>
         value: format!("{text:?}"),
         allowed: "one line of printable ASCII characters",
     })
+}
+
+/// Returns the name in the head of a program.
+pub(super) fn name_of(head: &str) -> &str {
+    head.split('(').next().unwrap_or_default().trim()
 }
 
 /// Returns a line of a listing without the number of its step.

@@ -16,9 +16,6 @@ const RUN: &str = "PGRUN";
 const ONCE: &str = "PGONCE";
 const HIT: &str = "PGHIT";
 
-/// Program that moves to a point where nothing is echoed.
-const GOAL: &str = "PGMOVE";
-
 /// Variable in which the called program notes that it ran. A signal that has come and gone leaves
 /// nothing else behind.
 const LATCH: &str = "PGH";
@@ -42,8 +39,9 @@ impl<T: Transport> Val2Client<T> {
     pub fn arm_proximity(&mut self, signal: u16) -> Result<(), ArmError> {
         self.signal(signal)?;
         self.type_program(HIT, &[format!("{LATCH} = -1"), "HALT".to_owned()])?;
-        let to_goal = format!("MOVE #{}", self.wire.config.point_name);
-        self.type_program(RUN, &guarded_steps(signal, &[to_goal]))?;
+        let to_goal = format!("MOVE {}", self.goal());
+        let steps = self.steps_to_point(&to_goal);
+        self.type_program(RUN, &guarded_steps(signal, &steps))?;
         self.command(&format!("DO {LATCH} = 0"))?;
         if self.truth(LATCH)? {
             return Err(self.wire.garbled(LATCH, "0, as it was set", "-1"));
@@ -61,43 +59,25 @@ impl<T: Transport> Val2Client<T> {
         Ok(())
     }
 
-    /// Moves to the point that has been defined, under guard.
-    pub(super) fn run_guarded(
+    /// Returns the program that carries out a motion to a point under guard.
+    pub(super) fn guarding(
         &mut self,
         speed: Option<f64>,
-        limit: Duration,
-    ) -> Result<(), Failed> {
-        match (speed, self.guard) {
-            (Some(speed), Some(signal)) => {
-                let to_goal = format!("MOVE #{}", self.wire.config.point_name);
-                let steps = [format!("SPEED {}", plain(speed)), to_goal];
-                self.run_guarded_once(signal, &steps, limit)
-            }
-            _ => self.run(&format!("EXECUTE {RUN}"), limit).map(drop),
+        motion: &str,
+    ) -> Result<&'static str, ArmError> {
+        let Some(signal) = self.guard else {
+            return Ok(RUN);
+        };
+        if speed.is_none() && motion == format!("MOVE {}", self.goal()) {
+            return Ok(RUN);
         }
-    }
-
-    /// Moves to a point that has just been defined.
-    ///
-    /// Without an echo a damaged name could be that of a point that another damaged line has made.
-    /// A stored program holds the name then, and its listing has been compared.
-    pub(super) fn move_to_point(
-        &mut self,
-        word: &str,
-        name: &str,
-        limit: Duration,
-    ) -> Result<(), Failed> {
-        let motion = format!("{word} {name}");
-        if self.wire.checks_echo() {
-            let line = format!("DO {motion}");
-            return self.command_once(&line, limit).map(drop);
+        let mut steps = self.steps_to_point(motion);
+        if let Some(speed) = speed {
+            let at = steps.iter().position(|step| step == motion);
+            steps.insert(at.unwrap_or(0), format!("SPEED {}", plain(speed)));
         }
-        if self.goal_program.as_ref() != Some(&motion) {
-            self.goal_program = None;
-            self.type_program(GOAL, std::slice::from_ref(&motion))?;
-            self.goal_program = Some(motion);
-        }
-        self.run(&format!("EXECUTE {GOAL}"), limit).map(drop)
+        self.type_program(ONCE, &guarded_steps(signal, &steps))?;
+        Ok(ONCE)
     }
 
     /// Runs these steps under guard. Their goal must not depend on the arm's position.

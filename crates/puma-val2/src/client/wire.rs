@@ -52,7 +52,7 @@ pub(super) fn is_doubt(error: &ArmError) -> bool {
     matches!(error, ArmError::Silence { .. } | ArmError::Garbled { .. })
 }
 
-/// Most characters without meaning (NUL, bell) in an echo.
+/// Most characters without meaning in an echo.
 const FILLERS: usize = 256;
 
 #[derive(Debug)]
@@ -69,6 +69,8 @@ pub(super) struct Wire<T> {
     pub(super) mode: Mode,
     /// The start-up dialogue has been met since the monitor was last reached.
     pub(super) restarted: bool,
+    /// The question of a program has been cancelled, and the program not yet been ended.
+    cancelled: bool,
 }
 
 impl<T: Transport> Wire<T> {
@@ -81,6 +83,7 @@ impl<T: Transport> Wire<T> {
             state: State::Open,
             mode: Mode::Session,
             restarted: false,
+            cancelled: false,
         }
     }
 
@@ -164,7 +167,9 @@ impl<T: Transport> Wire<T> {
     /// Types `line` at a prompt or question, ends it and reads the reply for up to `timeout`.
     pub(super) fn exchange(&mut self, line: &str, timeout: Duration) -> Result<Reply, Failed> {
         self.take_unasked()?;
-        if matches!(self.state, State::Open | State::Ended) {
+        if self.cancelled {
+            self.settle()?;
+        } else if matches!(self.state, State::Open | State::Ended) {
             // Left by a call that failed: what is typed now must not be added to it.
             self.spoil()?;
         }
@@ -256,7 +261,12 @@ impl<T: Transport> Wire<T> {
                 break;
             };
             let (before, count) = (heard.len(), bytes.len());
-            heard.extend(bytes.into_iter().filter(|b| !matches!(b, 0 | 0x07)));
+            // NUL, bell, and the characters of flow control.
+            heard.extend(
+                bytes
+                    .into_iter()
+                    .filter(|b| !matches!(b, 0 | 0x07 | 0x11 | 0x13)),
+            );
             fillers += count - (heard.len() - before);
             if fillers > FILLERS || self.left(until).is_zero() {
                 break;
@@ -376,17 +386,18 @@ impl<T: Transport> Wire<T> {
         let patience = self.config.patience();
         let mut reply = self.spoil()?;
         for attempt in 0..8 {
-            if reply.ending != Ending::Question {
-                return Ok(reply.ending);
-            }
-            let answer = way_out(&reply.text, attempt);
+            let answer = match reply.ending {
+                Ending::Question => way_out(&reply.text, attempt),
+                // The program that asked would wait for ever.
+                Ending::Running if self.cancelled => b"ABORT\r",
+                ending => {
+                    self.cancelled = false;
+                    return Ok(ending);
+                }
+            };
+            self.cancelled |= answer == CANCEL;
             self.send(answer, "leaving a dialogue")?;
             reply = self.read_reply("a refusal", patience)?;
-            if answer == CANCEL && reply.ending == Ending::Running {
-                // The program that asked would wait for ever.
-                self.send(b"ABORT\r", "leaving a dialogue")?;
-                reply = self.read_reply("ABORT", patience)?;
-            }
             reply = self.not_restarted(reply)?;
         }
         let heard = "one question after another";

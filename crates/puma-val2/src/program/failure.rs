@@ -49,7 +49,7 @@ impl From<ArmError> for Failure {
             ArmError::Setting { .. } | ArmError::JointLimit { .. } | ArmError::NotFinite { .. } => {
                 2
             }
-            ArmError::Refused { .. } | ArmError::Asked { .. } => 3,
+            ArmError::Refused { .. } | ArmError::Step { .. } | ArmError::Asked { .. } => 3,
             ArmError::Open { .. }
             | ArmError::Line { .. }
             | ArmError::Silence { .. }

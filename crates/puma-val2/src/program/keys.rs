@@ -24,7 +24,13 @@ pub(super) fn jog(client: &mut Client<'_>) -> Result<(), Failure> {
     loop {
         print!("{joint}  step {step} degrees  {stands}   \r");
         io::stdout().flush()?;
-        let sign = match keyboard.key()? {
+        let key = keyboard.key()?;
+        if client.line().is_interrupted() {
+            // The caller stops the arm.
+            return Err(Failure::usage("interrupted"));
+        }
+        let Some(key) = key else { continue };
+        let sign = match key {
             digit @ b'1'..=b'6' => {
                 joint = Joint::ALL[usize::from(digit - b'1')];
                 continue;
@@ -44,6 +50,7 @@ pub(super) fn jog(client: &mut Client<'_>) -> Result<(), Failure> {
         };
         match client.drive(joint, (sign * step).to_radians(), 100.0) {
             Ok(joints) => stands = joints,
+            Err(_) if client.line().is_interrupted() => {}
             Err(error) => println!("\r\n{error}\r"),
         }
         keyboard.forget()?;
@@ -83,11 +90,22 @@ impl Keyboard {
         Ok(flushed.map_err(std::io::Error::from)?)
     }
 
-    /// Waits for a key. Of several only the last counts.
-    fn key(&self) -> Result<u8, Failure> {
+    /// Waits for a key, a tenth of a second at most. Of several only the last counts.
+    fn key(&self) -> Result<Option<u8>, Failure> {
+        use rustix::event::{PollFd, PollFlags, Timespec, poll};
+
+        let stdin = std::io::stdin();
+        let wait = Timespec {
+            tv_sec: 0,
+            tv_nsec: 100_000_000,
+        };
+        match poll(&mut [PollFd::new(&stdin, PollFlags::IN)], Some(&wait)) {
+            Ok(0) | Err(rustix::io::Errno::INTR) => return Ok(None),
+            ready => ready.map_err(std::io::Error::from)?,
+        };
         let mut keys = [0; 256];
-        let count = rustix::io::read(std::io::stdin(), &mut keys).map_err(std::io::Error::from)?;
-        Ok(if count == 0 { b'q' } else { keys[count - 1] })
+        let count = rustix::io::read(&stdin, &mut keys).map_err(std::io::Error::from)?;
+        Ok(Some(if count == 0 { b'q' } else { keys[count - 1] }))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The line of the program to its controller.
 
+use std::cell::Cell;
 use std::fs::File;
 use std::io;
 use std::sync::Arc;
@@ -12,16 +13,23 @@ use crate::program::failure::Failure;
 use crate::program::{Command, Globals, commands, term};
 use crate::transport::{Recorded, SerialLine, TcpLine, Transport};
 
-/// A line that Ctrl-C interrupts.
+/// A line that Ctrl-C interrupts: it fails once, so that what has been begun can still be cleared
+/// away.
 pub(super) struct Link {
     line: Box<dyn Transport>,
-    pub(super) interrupted: Arc<AtomicBool>,
+    interrupted: Arc<AtomicBool>,
+    failed: Cell<bool>,
 }
 
 impl Link {
+    /// Returns `true` if Ctrl-C has come.
+    pub(super) fn is_interrupted(&self) -> bool {
+        self.interrupted.load(Ordering::Acquire) || self.failed.get()
+    }
+
     /// Returns `true` once for each Ctrl-C.
     pub(super) fn take_interrupt(&self) -> bool {
-        self.interrupted.swap(false, Ordering::AcqRel)
+        self.interrupted.swap(false, Ordering::AcqRel) | self.failed.replace(false)
     }
 }
 
@@ -33,7 +41,8 @@ impl Transport for Link {
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<usize>> {
         let until = self.clock().saturating_add(timeout);
         loop {
-            if self.interrupted.load(Ordering::Acquire) {
+            if self.interrupted.swap(false, Ordering::AcqRel) {
+                self.failed.set(true);
                 return Err(io::Error::other("interrupted by Ctrl-C"));
             }
             let left = until.saturating_sub(self.clock());
@@ -86,14 +95,17 @@ fn config(globals: &Globals) -> Result<ClientConfig, Failure> {
         let names = Profile::all().map(|p| p.name).join(", ");
         Failure::usage(format!("no profile `{name}`: there are {names}"))
     })?;
+    let usual = ClientConfig::for_baud(globals.baud.unwrap_or(9600));
     Ok(ClientConfig {
+        // Half of what a program of its own may wait.
+        connect_timeout: usual.connect_timeout / 2,
         control_characters: profile.control_characters,
         way: if profile.ppoint {
             MoveWay::Automatic
         } else {
             MoveWay::Point
         },
-        ..ClientConfig::for_baud(globals.baud.unwrap_or(9600))
+        ..usual
     })
 }
 
@@ -118,5 +130,9 @@ fn open(globals: &Globals) -> Result<Link, Failure> {
         })?;
         line = Box::new(Recorded::new(line, file));
     }
-    Ok(Link { line, interrupted })
+    Ok(Link {
+        line,
+        interrupted,
+        failed: Cell::new(false),
+    })
 }

@@ -38,9 +38,6 @@ pub(super) fn run(link: &mut Link, config: &ClientConfig) -> Result<(), Failure>
     let mut buffer = [0; 512];
     let mut ended = false;
     loop {
-        if link.take_interrupt() {
-            link.send(b"\x03")?;
-        }
         let quiet = config.quiet.max(Duration::from_millis(50));
         match link.receive(&mut buffer, quiet) {
             Ok(Some(count)) => {
@@ -52,7 +49,10 @@ pub(super) fn run(link: &mut Link, config: &ClientConfig) -> Result<(), Failure>
             }
             Ok(None) => {}
             // Ctrl-C is for the controller.
-            Err(_) if link.interrupted.load(std::sync::atomic::Ordering::Acquire) => continue,
+            Err(_) if link.take_interrupt() => {
+                link.send(b"\x03")?;
+                continue;
+            }
             Err(error) => return Err(error.into()),
         }
         let asks = said.ending().is_some();

@@ -104,7 +104,7 @@ fn a_refused_step_leaves_everything_as_it_was() {
     let text = ".PROGRAM A\n MOVE P1\n.END\n.PROGRAM B\n FROBNICATE 1\n.END\n.REALS\nN 1\n.END";
     assert_matches!(
         client.restore(text, false),
-        Err(ArmError::Refused { sent, .. }) if sent == "FROBNICATE 1"
+        Err(ArmError::Step { line: 5, word: Some(word), .. }) if word == "FROBNICATE"
     );
     assert_eq!(client.backup().unwrap(), before);
     client
@@ -119,7 +119,8 @@ fn a_text_that_is_no_backup_is_refused_by_its_line() {
     let sent = client.line().traffic();
     for (text, line) in [
         ("MOVE P1", 1),
-        (".PROGRAM belt()\n.END", 1),
+        (".PROGRAM belt(1)\n.END", 1),
+        (".PROGRAM belt(a\n.END", 1),
         (".PROGRAM A\n TYPE 1\n", 2),
         (".REALS\nN one\n.END", 2),
         (".REALS\nN nan\n.END", 2),

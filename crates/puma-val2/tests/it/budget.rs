@@ -10,10 +10,15 @@ use puma_val2::{
 
 /// A calibrated client of an arm that is everywhere at once, on a paced line.
 fn client(way: MoveWay, quiet: u64) -> Val2Client<MemoryLine> {
+    client_at(way, quiet, true)
+}
+
+fn client_at(way: MoveWay, quiet: u64, echo: bool) -> Val2Client<MemoryLine> {
     let mut swift = PumaParams::unimation();
     swift.ranges.iter_mut().for_each(|range| range.speed *= 1e4);
     let profile = Profile {
         baud: Some(9600),
+        echo,
         acceleration_time: Duration::from_millis(1),
         step_time: Duration::from_micros(100),
         ..Profile::val2()
@@ -120,4 +125,21 @@ fn the_ways_to_move_by_their_cost() {
             && point > guarded
             && resident > 2.0 * ppoint
     );
+}
+
+#[test]
+fn a_move_without_an_echo_costs_a_tenth_more_at_most() {
+    let meter = |c: &mut Val2Client<MemoryLine>| (c.line().clock(), c.line().traffic());
+    for (guard, limit) in [(false, 74), (true, 85)] {
+        let mut client = client_at(MoveWay::Automatic, 30, false);
+        if guard {
+            client.arm_proximity(1001).unwrap();
+        }
+        // The first move defines the point and types the program.
+        let by = JointDelta::from_degrees([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
+        client.move_by(by).unwrap();
+        let (sent, received, rate) = cost(&mut client, 3, meter);
+        println!("| nothing echoed, guard {guard} | {sent} | {received} | {rate:.2} | |");
+        assert!(sent <= limit * 11 / 10, "{sent}");
+    }
 }

@@ -32,6 +32,8 @@ mod interpreter;
 mod oracles;
 #[cfg(all(unix, feature = "cli"))]
 mod owner;
+#[cfg(all(unix, feature = "cli"))]
+mod owner_faults;
 mod profiles;
 #[cfg(feature = "cli")]
 mod program;

@@ -3,7 +3,7 @@
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::fd::OwnedFd;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use puma_val2::SerialLine;
@@ -12,36 +12,51 @@ use rustix::process::{Pid, Signal, kill_process};
 use crate::program::{emulate, listening};
 
 /// An emulated controller, served by the program itself.
-struct Bench {
-    emulator: Child,
-    port: String,
-    folder: tempfile::TempDir,
+pub(crate) struct Bench {
+    pub(crate) emulator: Child,
+    said: BufReader<ChildStdout>,
+    pub(crate) port: String,
+    pub(crate) folder: tempfile::TempDir,
 }
 
 impl Bench {
-    fn new(options: &[&str]) -> Self {
-        let (emulator, port) = listening(&mut emulate(options));
+    pub(crate) fn new(options: &[&str]) -> Self {
+        let (emulator, port, said) = listening(&mut emulate(options));
         let folder = tempfile::tempdir().unwrap();
         Self {
             emulator,
+            said,
             port,
             folder,
         }
     }
 
-    fn command(&self, words: &[&str]) -> Command {
+    /// The joint angles of the arm itself, by the panel.
+    pub(crate) fn arm(&mut self) -> Vec<f64> {
+        let mut panel = self.emulator.stdin.as_ref().unwrap();
+        panel.write_all(b"joints\n").unwrap();
+        let mut line = String::new();
+        self.said.read_line(&mut line).unwrap();
+        let angles = line.trim_start_matches('(').split(')').next().unwrap();
+        angles
+            .split(", ")
+            .map(|angle| angle.parse().unwrap())
+            .collect()
+    }
+
+    pub(crate) fn command(&self, words: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_val2"));
         let command_line = command.args(["--port", &self.port]).args(words);
         command_line.current_dir(&self.folder).stdin(Stdio::null());
         command
     }
 
-    fn output(&self, words: &[&str]) -> Output {
+    pub(crate) fn output(&self, words: &[&str]) -> Output {
         self.command(words).output().unwrap()
     }
 
     /// The standard output of a command that succeeds.
-    fn says(&self, words: &[&str]) -> String {
+    pub(crate) fn says(&self, words: &[&str]) -> String {
         let output = self.output(words);
         let errors = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{words:?}: {errors}");
@@ -49,7 +64,7 @@ impl Bench {
     }
 
     /// The standard error of a command that ends with this exit code.
-    fn fails(&self, code: i32, words: &[&str]) -> String {
+    pub(crate) fn fails(&self, code: i32, words: &[&str]) -> String {
         let output = self.output(words);
         let errors = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(code), "{words:?}: {errors}");
@@ -57,7 +72,7 @@ impl Bench {
         errors
     }
 
-    fn joints(&self) -> Vec<f64> {
+    pub(crate) fn joints(&self) -> Vec<f64> {
         let value: serde_json::Value =
             serde_json::from_str(&self.says(&["--json", "where"])).unwrap();
         assert_eq!(value["xyzoat"].as_array().unwrap().len(), 6);
@@ -65,11 +80,11 @@ impl Bench {
         joints.iter().map(|v| v.as_f64().unwrap()).collect()
     }
 
-    fn write(&self, name: &str, text: &str) {
+    pub(crate) fn write(&self, name: &str, text: &str) {
         fs::write(self.folder.path().join(name), text).unwrap();
     }
 
-    fn read(&self, name: &str) -> String {
+    pub(crate) fn read(&self, name: &str) -> String {
         fs::read_to_string(self.folder.path().join(name)).unwrap()
     }
 
@@ -171,8 +186,12 @@ fn a_backup_brings_everything_back_after_a_wipe() {
         "bad.v2",
         ".PROGRAM A\n MOVE #SPOT\n.END\n.PROGRAM B\n FROB 1\n.END\n",
     );
-    assert!(bench.fails(3, &["put", "bad.v2"]).contains("FROB 1"));
-    bench.write("vplus.v2", ".PROGRAM belt()\n.END\n");
+    let refused = bench.fails(3, &["put", "bad.v2"]);
+    assert!(
+        refused.contains("line 5") && refused.contains("at `FROB`"),
+        "{refused}"
+    );
+    bench.write("vplus.v2", ".PROGRAM belt(1)\n.END\n");
     assert!(bench.fails(1, &["put", "vplus.v2"]).contains("line 1"));
     assert!(bench.fails(1, &["put", "none.v2"]).contains("none.v2"));
     assert_eq!(lists(&bench), before);
@@ -315,7 +334,7 @@ fn wrong_calls_say_so_in_one_line_and_move_nothing() {
 }
 
 /// A terminal of its own for a program that reads keys.
-fn keyboard() -> (fs::File, OwnedFd) {
+pub(crate) fn keyboard() -> (fs::File, OwnedFd) {
     use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();

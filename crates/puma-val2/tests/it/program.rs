@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
 /// The program with these options.
@@ -15,14 +15,14 @@ pub(crate) fn emulate(options: &[&str]) -> Command {
 }
 
 /// Starts an emulator and returns it with the address that its first line names.
-pub(crate) fn listening(command: &mut Command) -> (Child, String) {
+pub(crate) fn listening(command: &mut Command) -> (Child, String, BufReader<ChildStdout>) {
     let command = command.stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut emulator = command.spawn().unwrap();
     let mut first = String::new();
-    let out = emulator.stdout.take().unwrap();
-    BufReader::new(out).read_line(&mut first).unwrap();
+    let mut out = BufReader::new(emulator.stdout.take().unwrap());
+    out.read_line(&mut first).unwrap();
     let address = first.trim().strip_prefix("listening on ").unwrap();
-    (emulator, address.to_owned())
+    (emulator, address.to_owned(), out)
 }
 
 /// The program on any free socket, with this folder as its floppy disk.
@@ -40,7 +40,7 @@ struct Terminal {
 impl Terminal {
     /// Starts the emulator with this folder as its floppy disk.
     fn with_floppy(folder: &Path) -> Self {
-        let (emulator, address) = listening(&mut serving(folder));
+        let (emulator, address, _) = listening(&mut serving(folder));
         let line = TcpStream::connect(address).unwrap();
         line.set_read_timeout(Some(Duration::from_secs(20)))
             .unwrap();

@@ -4,10 +4,9 @@ use puma_val2::{
     ArmError, ClientConfig, Emulator, Joint, JointDelta, Manipulator, MoveWay, Profile, PumaParams,
     Val2Client,
 };
-use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 
 use crate::faults::harness::{STEP, Subject, Tally, client, config, judge, truth};
-use crate::faults::line::{CHARACTERS, Damage, FaultyLine, Way};
+use crate::faults::line::{CHARACTERS, Damage, FaultyLine, Noise, Way};
 
 fn profiles_and_ways() -> Vec<(Profile, MoveWay)> {
     let silent = Profile {
@@ -89,8 +88,7 @@ fn noise_never_moves_the_arm_beyond_its_goal() {
                 .place_arm(Subject::READY);
             client.joints().unwrap();
             let (start, rate) = (truth(&client), [0.001, 0.004][turn % 2]);
-            let random = Xoshiro256PlusPlus::seed_from_u64(turn as u64);
-            client.line_mut().noise = Some((rate, random));
+            client.line_mut().noise = Some(Noise::of_all_kinds(rate, turn as u64));
             client.line_mut().struck = false;
             let outcome = client.move_by(STEP);
             client.line_mut().heal();

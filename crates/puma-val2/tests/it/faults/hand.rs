@@ -35,7 +35,7 @@ fn silent() -> Profile {
 fn damage_anywhere_in_a_move_of_the_hand() {
     let mut sum = Tally::default();
     for profile in [Profile::val2(), Profile::val2_strict_miz(), silent()] {
-        sum.add(&moving_the_hand(profile, 2).strike_both_ways(&CHARACTERS));
+        sum.add(&moving_the_hand(profile, 3).strike_both_ways(&CHARACTERS));
     }
     sum.show("moves of the hand, single characters");
     assert!(

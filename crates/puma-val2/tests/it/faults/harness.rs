@@ -23,8 +23,16 @@ pub(crate) fn config(way: MoveWay) -> ClientConfig {
 }
 
 pub(crate) fn client(profile: Profile, way: MoveWay) -> Client {
-    let line = FaultyLine::new(Emulator::new(PumaParams::unimation(), profile));
-    let mut client = Val2Client::connect(line, config(way)).unwrap();
+    client_of(PumaParams::unimation(), profile, way)
+}
+
+pub(crate) fn client_of(arm: PumaParams, profile: Profile, way: MoveWay) -> Client {
+    let config = ClientConfig {
+        params: arm,
+        ..config(way)
+    };
+    let line = FaultyLine::new(Emulator::new(arm, profile));
+    let mut client = Val2Client::connect(line, config).unwrap();
     client.calibrate().unwrap();
     client.joints().unwrap();
     client
@@ -152,10 +160,12 @@ pub(crate) fn judge(
 pub(crate) type Strike<'a> = &'a dyn Fn(&mut FaultyLine);
 
 /// A call at every character of which the line is struck: it moves the arm by [`STEP`].
+#[derive(Clone)]
 pub(crate) struct Subject<'a> {
     pub(crate) name: &'a str,
     pub(crate) profile: Profile,
     pub(crate) way: MoveWay,
+    pub(crate) arm: PumaParams,
     /// Done before each call, on a sound line, the arm standing at home.
     pub(crate) prepare: &'a dyn Fn(&mut Client),
     /// The call; it lets the strike loose.
@@ -181,6 +191,7 @@ impl<'a> Subject<'a> {
             name: "move_by",
             profile,
             way,
+            arm: PumaParams::unimation(),
             prepare: &|_| (),
             act: &|client, strike| {
                 strike(client.line_mut());
@@ -198,7 +209,7 @@ impl<'a> Subject<'a> {
         damage: &dyn Fn(usize) -> Damage,
     ) -> Tally {
         let mut tally = Tally::default();
-        let fresh = || client(self.profile.clone(), self.way);
+        let fresh = || client_of(self.arm, self.profile.clone(), self.way);
         let mut client = fresh();
         for at in (0..).step_by(self.stride) {
             let damage = damage(at);

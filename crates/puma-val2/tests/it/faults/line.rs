@@ -4,7 +4,7 @@ use std::io;
 use std::time::Duration;
 
 use puma_val2::{Emulator, MemoryLine, Transport};
-use rand::{RngExt, rngs::Xoshiro256PlusPlus};
+use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
 /// Damage to one character.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,6 +12,14 @@ pub(crate) enum Damage {
     Lost,
     Doubled,
     Flipped(u8),
+    /// Several bits at once: those of a mask.
+    Masked(u8),
+    /// It and those after it, this many together.
+    Burst(usize),
+    /// It and those after it, up to the end of the line.
+    Line,
+    /// Preceded by another.
+    Inserted(u8),
     /// It and all that follow, for ever.
     Cut,
     /// The line reports its end.
@@ -24,6 +32,16 @@ pub(crate) enum Way {
     FromController,
 }
 
+impl Way {
+    /// Character at the end of a line.
+    fn line_end(self) -> u8 {
+        match self {
+            Self::ToController => b'\r',
+            Self::FromController => b'\n',
+        }
+    }
+}
+
 /// Damages that noise causes.
 pub(crate) const CHARACTERS: [&dyn Fn(usize) -> Damage; 4] = [
     &|_| Damage::Lost,
@@ -31,6 +49,30 @@ pub(crate) const CHARACTERS: [&dyn Fn(usize) -> Damage; 4] = [
     &|at| Damage::Flipped((at % 7) as u8),
     &|at| Damage::Flipped(((at + 3) % 7) as u8),
 ];
+
+/// Damage at random: its chance at any character, its kind, and the ways that it takes.
+pub(crate) struct Noise {
+    pub(crate) chance: f64,
+    pub(crate) kind: fn(&mut Xoshiro256PlusPlus) -> Damage,
+    pub(crate) ways: &'static [Way],
+    pub(crate) random: Xoshiro256PlusPlus,
+}
+
+impl Noise {
+    /// Any of the three things that happen to a character, in both directions.
+    pub(crate) fn of_all_kinds(chance: f64, seed: u64) -> Self {
+        Self {
+            chance,
+            kind: |random| match random.random_range(0..3) {
+                0 => Damage::Lost,
+                1 => Damage::Doubled,
+                _ => Damage::Flipped(random.random_range(0..8)),
+            },
+            ways: &[Way::ToController, Way::FromController],
+            random: Xoshiro256PlusPlus::seed_from_u64(seed),
+        }
+    }
+}
 
 /// Something that happens to a controller.
 pub(crate) type Disturbance = Box<dyn FnOnce(&mut Emulator)>;
@@ -41,7 +83,7 @@ pub(crate) struct FaultyLine {
     /// Damage to the character of this number, counted from when it was set.
     pub(crate) single: Option<(Way, usize, Damage)>,
     /// Damage to any character with this probability.
-    pub(crate) noise: Option<(f64, Xoshiro256PlusPlus)>,
+    pub(crate) noise: Option<Noise>,
     pub(crate) counted: [usize; 2],
     pub(crate) closed: bool,
     pub(crate) cut: bool,
@@ -51,6 +93,8 @@ pub(crate) struct FaultyLine {
     /// Done once, when the arm has been moving for a while.
     pub(crate) disturb: Option<Disturbance>,
     moving_since: Option<Duration>,
+    /// Characters that a burst still takes.
+    burst: usize,
 }
 
 impl FaultyLine {
@@ -66,6 +110,7 @@ impl FaultyLine {
             forge: None,
             disturb: None,
             moving_since: None,
+            burst: 0,
         }
     }
 
@@ -92,14 +137,18 @@ impl FaultyLine {
             {
                 damage = Some(d);
             }
-            if let Some((chance, random)) = &mut self.noise
-                && random.random_bool(*chance)
+            if let Some(noise) = &mut self.noise
+                && noise.ways.contains(&way)
+                && noise.random.random_bool(noise.chance)
             {
-                damage = Some(match random.random_range(0..3) {
-                    0 => Damage::Lost,
-                    1 => Damage::Doubled,
-                    _ => Damage::Flipped(random.random_range(0..8)),
-                });
+                damage = Some((noise.kind)(&mut noise.random));
+            }
+            if self.burst > 0 {
+                self.burst -= 1;
+                damage = Some(Damage::Lost);
+                if self.burst > 1000 && byte == way.line_end() {
+                    self.burst = 0;
+                }
             }
             self.struck |= damage.is_some();
             match damage {
@@ -108,6 +157,11 @@ impl FaultyLine {
                 Some(Damage::Lost) => {}
                 Some(Damage::Doubled) => out.extend([byte, byte]),
                 Some(Damage::Flipped(bit)) => out.push(byte ^ (1 << bit)),
+                Some(Damage::Masked(bits)) => out.push(byte ^ bits),
+                Some(Damage::Burst(count)) => self.burst = count - 1,
+                Some(Damage::Line) if byte == way.line_end() => {}
+                Some(Damage::Line) => self.burst = usize::MAX,
+                Some(Damage::Inserted(other)) => out.extend([other, byte]),
                 Some(Damage::Cut) => self.cut = true,
                 Some(Damage::Closed) => self.closed = true,
             }

@@ -9,6 +9,7 @@ mod babble;
 mod characters;
 mod connecting;
 mod events;
+mod field;
 mod guard;
 mod hand;
 mod harness;

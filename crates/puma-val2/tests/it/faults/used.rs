@@ -58,24 +58,101 @@ fn a_flipped_bit_never_moves_the_arm_to_an_old_goal() {
     assert!(sum.recovered * 10 > sum.injected * 9, "{sum:?}");
 }
 
+/// The arm and the abilities of a PUMA 260.
+fn small(way: MoveWay) -> Subject<'static> {
+    Subject {
+        arm: PumaParams::puma_260(PumaParams::unimation().ranges),
+        ..used(Profile::val2_strict_miz(), way)
+    }
+}
+
+fn guarded(subject: Subject<'static>) -> Subject<'static> {
+    Subject {
+        name: "guarded move_by after other moves",
+        act: &|client, strike| {
+            client.arm_proximity(1001).unwrap();
+            strike(client.line_mut());
+            let outcome = client.move_by(STEP);
+            client.disarm_proximity().unwrap();
+            outcome
+        },
+        ..subject
+    }
+}
+
 #[test]
 fn a_flipped_bit_never_guides_a_guarded_move_to_an_old_goal() {
     let mut sum = Tally::default();
-    for bit in 0..8 {
-        let guarded = Subject {
-            act: &|client, strike| {
-                client.arm_proximity(1001).unwrap();
-                strike(client.line_mut());
-                let outcome = client.move_by(STEP);
-                client.disarm_proximity().unwrap();
-                outcome
-            },
-            ..used(Profile::val2(), MoveWay::Automatic)
-        };
-        sum.add(&guarded.strike_everywhere(Way::ToController, &|_| Damage::Flipped(bit)));
+    let automatic = MoveWay::Automatic;
+    for (subject, stride) in [
+        (used(Profile::val2(), automatic), 1),
+        (small(automatic), 5),
+        (used(silent(), automatic), 5),
+    ] {
+        for bit in 0..8 {
+            let subject = Subject {
+                stride,
+                ..subject.clone()
+            };
+            let damage = |_| Damage::Flipped(bit);
+            sum.add(&guarded(subject).strike_everywhere(Way::ToController, &damage));
+        }
     }
     sum.show("used client under guard, single characters");
     assert!(sum.recovered * 10 > sum.injected * 9, "{sum:?}");
+}
+
+#[test]
+fn a_flipped_bit_never_moves_a_puma_260_to_an_old_goal() {
+    let mut sum = Tally::default();
+    for damage in (0..8)
+        .map(Damage::Flipped)
+        .chain([Damage::Lost, Damage::Doubled])
+    {
+        let to = Subject {
+            stride: 3,
+            ..small(MoveWay::Automatic)
+        };
+        sum.add(&to.strike_everywhere(Way::ToController, &|_| damage));
+        let from = Subject {
+            stride: 37,
+            ..small(MoveWay::Automatic)
+        };
+        sum.add(&from.strike_everywhere(Way::FromController, &|_| damage));
+    }
+    sum.show("used client of a PUMA 260, single characters");
+    assert!(sum.recovered * 10 > sum.injected * 9, "{sum:?}");
+}
+
+#[test]
+fn bursts_bit_pairs_and_lost_lines_never_lead_to_an_old_goal() {
+    let mut sum = Tally::default();
+    let automatic = MoveWay::Automatic;
+    for subject in [
+        used(Profile::val2(), automatic),
+        small(automatic),
+        used(silent(), automatic),
+        guarded(used(silent(), automatic)),
+    ] {
+        for damage in [
+            Damage::Burst(2),
+            Damage::Burst(7),
+            Damage::Burst(40),
+            Damage::Line,
+            Damage::Masked(0x03),
+            Damage::Masked(0x41),
+        ] {
+            for (direction, stride) in [(Way::ToController, 5), (Way::FromController, 41)] {
+                let subject = Subject {
+                    stride,
+                    ..subject.clone()
+                };
+                sum.add(&subject.strike_everywhere(direction, &|_| damage));
+            }
+        }
+    }
+    sum.show("used client, bursts, pairs of bits and lost lines");
+    assert!(sum.recovered * 10 > sum.injected * 8, "{sum:?}");
 }
 
 #[test]
