@@ -394,7 +394,18 @@ impl Normal {
             }
             inverses.push(inverse);
         }
-        let step = reduced.cholesky()?.solve(&gradient);
+        let mut step = reduced.cholesky()?.solve(&gradient);
+        // No backlash is below 0, where sightings would not depend on it.
+        let negative = |i: &usize| numbers[*i] - step[*i] < 0.0;
+        let ended: Vec<usize> = (at::PLAY..at::ARM).filter(negative).collect();
+        if !ended.is_empty() {
+            for i in ended {
+                let bar = 1e9 * reduced[(i, i)];
+                reduced[(i, i)] += bar;
+                gradient[i] += bar * numbers[i];
+            }
+            step = reduced.cholesky()?.solve(&gradient);
+        }
         let moved = balls
             .iter()
             .zip(&self.balls)
