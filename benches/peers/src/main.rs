@@ -11,6 +11,9 @@
 //! only, and so it is given no choice to make; its agent draws from the same generator as ours and
 //! only the action needed, which is the fastest that its interface allows.
 
+mod by_hand;
+
+use by_hand::{by_hand, by_hand_alike, softmax_by_hand};
 use qtable::{
     Action, Boltzmann, CachedBoltzmann, Environment, EpsilonGreedy, Error, Learner, Policy,
     QLearning, QTable, Schedule, State, Status, Step, Target, Traces, Training, Until,
@@ -221,67 +224,6 @@ fn cached<const LEARNERS: usize>(updates: u64, seed: u64) -> Result<f64> {
     measured
 }
 
-/// The loop that one would write by hand for this problem alone: the maximum of each row kept, ties
-/// by the lowest index, and no checks.
-fn by_hand(updates: u64) -> Result<f64> {
-    let mut table = vec![[0.0f64; ACTIONS]; STATES];
-    let mut best = [0usize; STATES];
-    let (mut rng, mut state) = (rng(1), 0);
-    let measured = rate(updates, || {
-        for _ in 0..updates {
-            let action = match rng.random::<f64>() < 0.1 {
-                true => rng.random_range(0..ACTIONS),
-                false => best[state],
-            };
-            let (next, reward) = transition(state, action);
-            let target = reward + GAMMA * table[next][best[next]];
-            let row = &mut table[state];
-            let old = row[action];
-            row[action] = old + ALPHA * (target - old);
-            if action == best[state] && row[action] < old {
-                for (other, value) in row.iter().enumerate() {
-                    if *value > row[best[state]] {
-                        best[state] = other;
-                    }
-                }
-            } else if row[action] > row[best[state]] {
-                best[state] = action;
-            }
-            state = next;
-        }
-        Ok(())
-    });
-    black_box(table[state][best[state]]);
-    measured
-}
-
-/// A softmax by hand with the exponential of the standard library, at 500 states and 4 actions.
-fn softmax_by_hand(updates: u64) -> Result<f64> {
-    let mut table = vec![[0.0f64; 4]; 500];
-    let (mut rng, mut state) = (rng(1), 0);
-    let measured = rate(updates, || {
-        for _ in 0..updates {
-            let highest = table[state].iter().copied().fold(f64::MIN, f64::max);
-            let weights = table[state].map(|value| ((value - highest) / TEMPERATURE).exp());
-            let mut rest = rng.random::<f64>() * weights.iter().sum::<f64>();
-            let action = weights.iter().position(|weight| {
-                rest -= weight;
-                rest < 0.0
-            });
-            let action = action.unwrap_or(3);
-            let step = small_step(State(state), Action(action));
-            let next = step.observation.0;
-            let highest = table[next].iter().copied().fold(f64::MIN, f64::max);
-            let old = table[state][action];
-            table[state][action] = old + ALPHA * (step.reward + GAMMA * highest - old);
-            state = next;
-        }
-        Ok(())
-    });
-    black_box(table[state][0]);
-    measured
-}
-
 /// The step of a problem of 500 states and 4 actions.
 #[inline(always)]
 fn small_step(state: State, action: Action) -> Step {
@@ -411,11 +353,12 @@ fn main() -> Result<()> {
         .next()
         .map_or(Ok(4_000_000), |text| text.parse())?;
     type Entry = (&'static str, fn(u64) -> Result<f64>);
-    let entries: [Entry; 17] = [
+    let entries: [Entry; 18] = [
         ("rurel 0.6.0, random actions, f64", rurel),
         ("random actions, f64", |n| epsilon_greedy(n, 1.0)),
         ("epsilon-greedy 0.1, f64", |n| epsilon_greedy(n, 0.1)),
-        ("the same by hand, lowest ties", by_hand),
+        ("the same by hand", by_hand_alike),
+        ("the same by hand, least work", by_hand),
         ("Boltzmann, plain, f64", |n| plain_boltzmann(n / 8)),
         ("Boltzmann, cached, f32", |n| cached::<1>(n, 1)),
         ("Boltzmann, cached, 2 interleaved", |n| cached::<2>(n, 1)),

@@ -73,6 +73,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod clock;
 mod elementary;
 mod error;
 #[cfg(feature = "files")]

@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use crate::clock::{BLOCK, Clock};
 use crate::elementary::{exp, ln};
 use crate::error::{Error, check_ascending, check_setting};
 use crate::validated::validated;
@@ -167,7 +168,11 @@ impl Schedule {
         match &self.shape {
             Shape::Constant(value) => *value,
             Shape::Linear(start, end, steps) => between(*start, *end, step, *steps),
-            Shape::Exponential(..) => self.falling(step, &mut Stretch::default()),
+            Shape::Exponential(start, end, steps) if step < *steps => {
+                let factor = self.factors[(step % BLOCK) as usize];
+                held_between(*start, *end, self.head(step) * factor)
+            }
+            Shape::Exponential(_, end, _) => *end,
             Shape::InverseVisits(start, scale) => start / (1.0 + step as f64 / scale),
             Shape::VisitsPower(start, exponent) => {
                 start * exp(-exponent * ln(step.saturating_add(1) as f64))
@@ -180,26 +185,34 @@ impl Schedule {
         }
     }
 
-    /// Returns the value of an exponential schedule: one exponential at the beginning of a stretch
-    /// of steps, and a product within it.
-    #[inline(always)]
-    fn falling(&self, step: u64, stretch: &mut Stretch) -> f64 {
-        let Shape::Exponential(start, end, steps) = self.shape else {
-            return f64::NAN;
-        };
-        if step >= steps {
-            return end;
+    /// Returns the value of an exponential schedule at the first step of a block.
+    fn head(&self, step: u64) -> f64 {
+        match self.shape {
+            Shape::Exponential(start, _, steps) => {
+                let first = step - step % BLOCK;
+                start * exp(self.log_ratio * (float(first) / float(steps)))
+            }
+            _ => f64::NAN,
         }
-        let first = step - step % STRETCH;
-        if stretch.first != Some(first) {
-            let value = start * exp(self.log_ratio * (float(first) / float(steps)));
-            *stretch = Stretch {
-                first: Some(first),
-                value,
-            };
+    }
+
+    /// Computes the values of a block of steps.
+    #[cold]
+    #[inline(never)]
+    fn block(&self, first: u64, values: &mut Vec<f64>) {
+        let steps = (0..BLOCK).map(|step| first.saturating_add(step));
+        values.clear();
+        match self.shape {
+            Shape::Exponential(start, end, last) if first < last.saturating_sub(BLOCK) => {
+                let head = self.head(first);
+                let factors = self.factors.iter();
+                values.extend(factors.map(|factor| held_between(start, end, head * factor)));
+            }
+            Shape::Linear(start, end, last) => {
+                values.extend(steps.map(|step| between(start, end, step, last)));
+            }
+            _ => values.extend(steps.map(|step| self.at(step))),
         }
-        let factor = self.factors[(step % STRETCH) as usize];
-        held_between(start, end, stretch.value * factor)
     }
 
     /// Returns values among which are the smallest and the largest.
@@ -239,24 +252,30 @@ impl Schedule {
         }
     }
 
-    /// Returns the value now, as [`now`](Schedule::now) does, at less cost.
+    /// Returns the value now, as [`now`](Schedule::now) does, at less cost: most steps take it from
+    /// the block that the clock keeps.
     #[inline(always)]
     pub(crate) fn current(&self, clock: &mut Clock, visits: u32) -> f64 {
-        if let Shape::Exponential(..) = self.shape {
-            return self.falling(clock.time(self.by_episode), &mut clock.stretch);
+        if let Shape::Constant(value) = self.shape {
+            return value;
         }
-        self.now(clock, visits)
+        if self.is_by_visits() {
+            return self.at(u64::from(visits));
+        }
+        let time = clock.time(self.by_episode);
+        let block = &mut clock.block;
+        if let Some(value) = block.values.get(time.wrapping_sub(block.first) as usize) {
+            return *value;
+        }
+        block.first = time - time % BLOCK;
+        self.block(block.first, &mut block.values);
+        block.values[(time - block.first) as usize]
     }
 
     /// Returns the value now of a quantity that belongs to no pair.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn at_time(&self, clock: &Clock) -> f64 {
-        let time = clock.time(self.by_episode);
-        match self.shape {
-            Shape::Constant(value) => value,
-            Shape::Linear(start, end, steps) => between(start, end, time, steps),
-            _ => self.at(time),
-        }
+        self.at(clock.time(self.by_episode))
     }
 
     /// Refuses a schedule that leaves `low..=high`.
@@ -296,7 +315,7 @@ impl Schedule {
                 check_setting(what, lower, lower >= f64::MIN_POSITIVE, "positive")?;
                 self.log_ratio = ln(*end) - ln(*start);
                 let factor = |step: u64| exp(self.log_ratio * (float(step) / float(*steps)));
-                self.factors = (0..STRETCH).map(factor).collect();
+                self.factors = (0..BLOCK).map(factor).collect();
             }
             Shape::InverseVisits(_, scale) => {
                 let valid = scale.is_finite() && *scale > 0.0;
@@ -314,56 +333,6 @@ impl Schedule {
             Shape::Constant(_) | Shape::Custom(_) => {}
         }
         Ok(self)
-    }
-}
-
-/// Actions taken and episodes begun so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Clock {
-    pub(crate) actions: u64,
-    episodes: u64,
-    #[cfg_attr(feature = "serde", serde(skip))]
-    stretch: Stretch,
-}
-
-/// Steps over which an exponential schedule is a product of two numbers.
-const STRETCH: u64 = 64;
-
-/// The value at the first of these steps, kept while they last. It follows from the schedule and
-/// the clock, so two are always equal.
-#[derive(Clone, Copy, Debug, Default)]
-struct Stretch {
-    first: Option<u64>,
-    value: f64,
-}
-
-impl PartialEq for Stretch {
-    fn eq(&self, _other: &Self) -> bool {
-        true
-    }
-}
-
-impl Clock {
-    /// Returns the step of a schedule by actions or by episodes.
-    #[inline(always)]
-    fn time(&self, by_episode: bool) -> u64 {
-        match by_episode {
-            true => self.episodes.saturating_sub(1),
-            false => self.actions,
-        }
-    }
-
-    /// Counts an action.
-    #[inline(always)]
-    pub(crate) fn tick(&mut self) {
-        self.actions = self.actions.saturating_add(1);
-    }
-
-    /// Counts an episode that begins.
-    #[inline(always)]
-    pub(crate) fn begin_episode(&mut self) {
-        self.episodes = self.episodes.saturating_add(1);
     }
 }
 

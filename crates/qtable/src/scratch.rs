@@ -7,8 +7,11 @@ pub(crate) struct Scratch(Vec<f64>);
 
 impl Scratch {
     /// Returns the buffer with a length, with its old contents.
+    #[inline(always)]
     pub(crate) fn of_length(&mut self, length: usize) -> &mut [f64] {
-        self.0.resize(length, 0.0);
+        if self.0.len() != length {
+            self.0.resize(length, 0.0);
+        }
         &mut self.0
     }
 }

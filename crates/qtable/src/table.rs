@@ -1,6 +1,8 @@
 //! The table: values, visits and the actions that each state offers.
 
+mod best;
 mod csv;
+mod greedy;
 mod keys;
 mod mask;
 mod qtable;

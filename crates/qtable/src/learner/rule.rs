@@ -2,9 +2,10 @@
 
 use rand::Rng;
 
+use crate::clock::Clock;
 use crate::error::{Error, check_finite, check_fraction};
 use crate::policy::Policy;
-use crate::schedule::{Clock, Schedule};
+use crate::schedule::Schedule;
 use crate::step::{Action, State, Status, Step};
 use crate::table::QTable;
 use crate::validated::validated;
@@ -177,13 +178,13 @@ impl Rates {
         action: Action,
         target: f64,
     ) -> Result<f64, Error> {
-        let entry = table.entry(state, action)?;
-        let (old, visits) = table.at(entry);
-        let error = target - old;
-        let alpha = self.alpha.current(&mut self.clock, visits);
-        table.store(state, action, old + alpha * error)?;
-        table.count(entry);
-        self.clock.tick();
+        table.check(state, action)?;
+        let (mut error, clock) = (0.0, &mut self.clock);
+        table.update(state, action, 1, |old, visits| {
+            error = target - old;
+            old + self.alpha.current(clock, visits) * error
+        })?;
+        clock.tick();
         Ok(error)
     }
 }

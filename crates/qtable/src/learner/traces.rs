@@ -102,6 +102,7 @@ impl Learner for Traces {
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
         let (state, action, step) = experience.parts(table)?;
+        table.refresh(step.observation);
         let scratch = &mut self.probabilities;
         let next = match step.status {
             Status::Terminated => 0.0,
@@ -129,14 +130,13 @@ impl Learner for Traces {
         let alpha = self.rates.alpha(table, state, action);
         check_finite("value", state, action, old + alpha * error)?;
         let entry = table.entry(state, action)?;
-        if self.recent.places.is_empty() || self.recent.head > Recent::SPARE {
+        if self.recent.shape != table.shape() || self.recent.head > Recent::SPARE {
             self.recent.compact(table)?;
         }
         self.recent.forget(entry, state, action);
         self.recent.spread(table, alpha * (target - expected))?;
-        table.store(state, action, old + alpha * error)?;
+        table.update(state, action, 1, |old, _| old + alpha * error)?;
         self.recent.push(entry, state, action);
-        table.count(entry);
         self.rates.clock.tick();
         match step.status {
             Status::Continuing => self.recent.decay(self.rates.gamma * self.lambda),
@@ -159,10 +159,12 @@ struct Recent {
     head: usize,
     pairs: Vec<(State, Action)>,
     traces: Vec<f64>,
+    /// Shape of the table in which all pairs lie.
+    shape: (usize, usize),
     /// Place of the last visit of each entry of the table; a hint, which may be outdated.
     places: Vec<u32>,
     /// Values before an update, to take it back.
-    before: Vec<(State, Action, f64)>,
+    before: Vec<f64>,
 }
 
 impl PartialEq for Recent {
@@ -216,6 +218,7 @@ impl Recent {
             let (state, action) = self.pairs[place];
             self.note(table.entry(state, action)?, place);
         }
+        self.shape = table.shape();
         Ok(())
     }
 
@@ -243,25 +246,16 @@ impl Recent {
 
     /// Moves every pair by `amount` times its trace: all of them, or none and an error.
     fn spread(&mut self, table: &mut QTable, amount: f64) -> Result<(), Error> {
-        self.before.clear();
-        for (&(state, action), &trace) in self.pairs[self.head..]
-            .iter()
-            .zip(&self.traces[self.head..])
-        {
-            if trace <= 0.0 {
-                continue;
-            }
-            let moved = table.entry(state, action).and_then(|entry| {
-                let (old, _) = table.at(entry);
-                self.before.push((state, action, old));
-                table.store(state, action, old + amount * trace)
-            });
-            if moved.is_err() {
-                for &(state, action, old) in &self.before {
-                    table.store(state, action, old)?;
-                }
-                return moved;
-            }
+        let (pairs, traces) = (&self.pairs[self.head..], &self.traces[self.head..]);
+        self.before.resize(self.pairs.len(), 0.0);
+        let before = &mut self.before[..pairs.len()];
+        if table.add_to_all(pairs, traces, amount, before) {
+            return Ok(());
+        }
+        table.put_back(pairs, before);
+        let moved = pairs.iter().zip(traces).zip(before);
+        for ((&(state, action), trace), old) in moved {
+            check_finite("value", state, action, *old + amount * trace)?;
         }
         Ok(())
     }

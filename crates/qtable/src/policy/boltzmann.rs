@@ -2,10 +2,11 @@
 
 use rand::{Rng, RngExt};
 
+use crate::clock::Clock;
 use crate::elementary::exp_within;
 use crate::error::Error;
 use crate::policy::rule::Policy;
-use crate::schedule::{Clock, Schedule};
+use crate::schedule::Schedule;
 use crate::scratch::Scratch;
 use crate::step::{Action, State};
 use crate::table::QTable;
@@ -66,6 +67,7 @@ impl Boltzmann {
 }
 
 impl Policy for Boltzmann {
+    #[inline(always)]
     fn choose(&mut self, table: &QTable, state: State, rng: &mut dyn Rng) -> Action {
         let temperature = self.temperature.current(&mut self.clock, 0);
         self.clock.tick();

@@ -1,10 +1,11 @@
 //! The ε-greedy policy.
 
-use rand::{Rng, RngExt};
+use rand::Rng;
 
+use crate::clock::Clock;
 use crate::error::Error;
 use crate::policy::rule::{Policy, Ties};
-use crate::schedule::{Clock, Schedule};
+use crate::schedule::Schedule;
 use crate::step::{Action, State};
 use crate::table::QTable;
 use crate::validated::validated;
@@ -12,7 +13,8 @@ use crate::validated::validated;
 validated! {
     /// The policy that takes a random offered action with probability ε and the best one otherwise.
     /// Of several best ones it draws one, unless [`with_ties`](EpsilonGreedy::with_ties) says
-    /// otherwise.
+    /// otherwise. ε is kept to within 2^-32; of `n` actions each is drawn with a probability that
+    /// differs from `1/n` by less than 2^-32.
     #[derive(Clone, Debug, PartialEq)]
     pub struct EpsilonGreedy {
         epsilon: Schedule,
@@ -48,23 +50,20 @@ impl EpsilonGreedy {
         self.epsilon.at_time(&self.clock)
     }
 
-    /// Draws one of the best actions, or of all, by a number in `0..1`. Out of line, since a table
-    /// that has learned has few ties and most have no mask.
+    /// Draws one of the best actions, or of all that are offered, by 32 random bits. Out of line,
+    /// since a table that has learned has few ties and most have no mask.
     #[cold]
     #[inline(never)]
-    fn draw(&self, table: &QTable, state: State, share: f64, explores: bool) -> Action {
-        let equals = match self.ties {
-            Ties::Lowest => 1,
-            Ties::Random => table.equals(state),
-        };
-        let count = match explores {
-            true => table.offered(state).count(),
-            false => equals,
+    fn draw(&self, table: &QTable, state: State, bits: u32, explores: bool) -> Action {
+        let count = match (explores, self.ties) {
+            (true, _) => table.offered(state).count(),
+            (false, Ties::Random) => table.equals(state),
+            (false, Ties::Lowest) => 1,
         };
         let mut wanted = table
             .offered(state)
             .filter(|&action| explores || is_best(table, state, action));
-        wanted.nth(part(share, count)).unwrap_or(table.best(state))
+        wanted.nth(part(bits, count)).unwrap_or(table.best(state))
     }
 
     fn restore(self) -> Result<Self, Error> {
@@ -78,21 +77,19 @@ impl Policy for EpsilonGreedy {
     fn choose(&mut self, table: &QTable, state: State, rng: &mut dyn Rng) -> Action {
         let epsilon = self.epsilon.current(&mut self.clock, 0);
         self.clock.tick();
-        // One number decides both: where it falls below ε, its place there is uniform again.
-        let drawn: f64 = rng.random();
-        let explores = drawn < epsilon;
-        let tied = table.equals(state) > 1 && self.ties == Ties::Random;
-        if table.is_restricted() | (tied & !explores) {
-            let share = match explores {
-                true => drawn / epsilon,
-                false => (drawn - epsilon) / (1.0 - epsilon),
+        // One half of the bits decides whether to explore, the other one what is drawn.
+        let drawn = rng.next_u64();
+        let bits = drawn as u32;
+        if f64::from((drawn >> 32) as u32) * 2.0f64.powi(-32) < epsilon {
+            return match table.is_restricted() {
+                true => self.draw(table, state, bits, true),
+                false => Action(part(bits, table.actions())),
             };
-            return self.draw(table, state, share, explores);
         }
-        if explores {
-            return Action(part(drawn / epsilon, table.actions()));
+        match table.only_best(state) {
+            Some(best) => best,
+            None => self.draw(table, state, bits, false),
         }
-        table.best(state)
     }
 
     fn probabilities(&self, table: &QTable, state: State, probabilities: &mut [f64]) -> bool {
@@ -116,11 +113,10 @@ impl Policy for EpsilonGreedy {
     }
 }
 
-/// Returns the part, of `count` equal ones, that a number of `0..1` falls into.
+/// Returns the part, of `count` equal ones, that 32 random bits fall into.
 #[inline(always)]
-fn part(share: f64, count: usize) -> usize {
-    // As a signed number, which the processor converts at once.
-    ((share * count as i64 as f64) as i64 as usize).min(count.saturating_sub(1))
+fn part(bits: u32, count: usize) -> usize {
+    ((u64::from(bits) * count as u64) >> 32) as usize
 }
 
 /// Returns `true` for an action of the highest value.

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, check_finite, check_index, check_length};
 use crate::step::{Action, State};
+use crate::table::best::Best;
 use crate::validated::validated;
 
 validated! {
@@ -37,36 +38,16 @@ validated! {
         /// Value of an entry that was never written, also in states added later.
         initial: f64,
         pub(super) values: Vec<f64>,
-        visits: Vec<u32>,
+        pub(super) visits: Vec<u32>,
         /// For each entry, `true` if the state offers the action; `None` if all are offered.
         pub(super) mask: Option<Vec<bool>>,
         /// The best action of each state.
         #[cfg_attr(feature = "serde", serde(skip))]
-        best: Vec<Best>,
+        pub(super) best: Vec<Best>,
         /// `true` once a dynamic environment was met: the mask is that of the present, and values
         /// of actions that were offered before may still be learned.
         #[cfg_attr(feature = "serde", serde(skip))]
         pub(super) dynamic: bool,
-    }
-}
-
-/// The best action of a row: the lowest index among those of the highest value.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Best {
-    value: f64,
-    action: u32,
-    /// Number of offered actions that have the highest value.
-    equals: u32,
-}
-
-impl Best {
-    #[inline(always)]
-    fn new(value: f64, action: u32, equals: u32) -> Self {
-        Self {
-            value,
-            action,
-            equals,
-        }
     }
 }
 
@@ -175,19 +156,6 @@ impl QTable {
         &self.values[self.start(state)..][..self.actions]
     }
 
-    /// Returns the highest value among the actions that a state offers.
-    #[inline(always)]
-    pub fn max(&self, state: State) -> f64 {
-        self.best[state.0].value
-    }
-
-    /// Returns the action of the highest value among those that a state offers; of several, the one
-    /// with the lowest index.
-    #[inline(always)]
-    pub fn best(&self, state: State) -> Action {
-        Action(self.best[state.0].action as usize)
-    }
-
     /// Returns how often a pair was visited.
     #[inline]
     pub fn visits(&self, state: State, action: Action) -> u32 {
@@ -238,12 +206,6 @@ impl QTable {
         Err(Error::ShapeMismatch(what, needed, found))
     }
 
-    /// Returns the number of offered actions that share the highest value.
-    #[inline(always)]
-    pub(crate) fn equals(&self, state: State) -> usize {
-        self.best[state.0].equals as usize
-    }
-
     /// Returns the first entry of a state, which panics outside the table: a product that wraps
     /// would lead to another row.
     #[inline(always)]
@@ -261,13 +223,25 @@ impl QTable {
     pub(crate) fn entry(&self, state: State, action: Action) -> Result<usize, Error> {
         let inside = state.0 < self.states() && action.0 < self.actions;
         let index = state.0.wrapping_mul(self.actions).wrapping_add(action.0);
-        if inside && self.mask.as_ref().is_none_or(|mask| mask[index]) {
+        if inside && self.mask.is_none() {
             return Ok(index);
         }
-        if inside && self.dynamic {
-            return Ok(index);
+        self.masked_entry(inside, index, state, action)
+    }
+
+    /// Returns the entry of a pair of a table with a mask.
+    #[inline(never)]
+    fn masked_entry(
+        &self,
+        inside: bool,
+        index: usize,
+        state: State,
+        action: Action,
+    ) -> Result<usize, Error> {
+        match &self.mask {
+            Some(mask) if inside && (self.dynamic || mask[index]) => Ok(index),
+            _ => Err(self.refuse(state, action)),
         }
-        Err(self.refuse(state, action))
     }
 
     /// Returns the error for a pair that is refused.
@@ -283,16 +257,10 @@ impl QTable {
     #[inline(always)]
     pub(crate) fn check_choice(&self, state: State, action: Action) -> Result<(), Error> {
         self.check(state, action)?;
-        if self.dynamic && !self.allows(state, action) {
+        if self.mask.is_some() && !self.allows(state, action) {
             return Err(Error::ActionNotAllowed(state, action));
         }
         Ok(())
-    }
-
-    /// Returns value and visits of an entry.
-    #[inline(always)]
-    pub(crate) fn at(&self, entry: usize) -> (f64, u32) {
-        (self.values[entry], self.visits[entry])
     }
 
     /// Counts a visit of an entry.
@@ -306,88 +274,6 @@ impl QTable {
     pub(crate) fn set_visits(&mut self, state: State, action: Action, visits: u32) {
         let entry = self.start(state) + action.0;
         self.visits[entry] = visits;
-    }
-
-    /// Writes a value at a pair that was checked, if it is finite, and keeps the best action.
-    #[inline(always)]
-    pub(crate) fn store(&mut self, state: State, action: Action, value: f64) -> Result<(), Error> {
-        check_finite("value", state, action, value)?;
-        let entry = state.0 * self.actions + action.0;
-        let old = std::mem::replace(&mut self.values[entry], value);
-        let best = &mut self.best[state.0];
-        let index = action.0 as u32;
-        if index == best.action && best.equals > 0 {
-            best.value = value;
-            if value < old {
-                self.find_best(state);
-            } else if value > old {
-                best.equals = 1;
-            }
-        } else if old.max(value) >= best.value && self.allows(state, action) {
-            self.follow(state, index, old, value);
-        }
-        Ok(())
-    }
-
-    /// Keeps the best action after an offered action other than it went from `old` to `value`, one
-    /// of which reaches the highest value.
-    #[inline]
-    fn follow(&mut self, state: State, action: u32, old: f64, value: f64) {
-        let best = &mut self.best[state.0];
-        if value > best.value {
-            *best = Best::new(value, action, 1);
-            return;
-        }
-        let (was, is) = (old >= best.value, value >= best.value);
-        best.equals = best.equals + u32::from(is) - u32::from(was);
-        if is {
-            best.action = best.action.min(action);
-        }
-    }
-
-    #[inline(never)]
-    pub(super) fn find_best(&mut self, state: State) {
-        let row = &self.values[state.0 * self.actions..][..self.actions];
-        let higher = |a: f64, b: f64| if b > a { b } else { a };
-        let mut found = Best::new(row[0], 0, 0);
-        match self.mask_row(state) {
-            None => {
-                // Lane by lane, so that it is done with vectors.
-                let (chunks, rest) = row.as_chunks::<8>();
-                let mut lanes = [row[0]; 8];
-                for chunk in chunks {
-                    for (lane, &value) in lanes.iter_mut().zip(chunk) {
-                        *lane = higher(*lane, value);
-                    }
-                }
-                let all = lanes.into_iter().chain(rest.iter().copied());
-                found.value = all.fold(row[0], higher);
-                let equals = row.iter().map(|&value| u32::from(value >= found.value));
-                found.equals = equals.sum();
-                let first = row.iter().position(|&value| value >= found.value);
-                found.action = first.unwrap_or(0) as u32;
-            }
-            Some(offered) => {
-                for (action, (&value, &offered)) in row.iter().zip(offered).enumerate() {
-                    if offered && (found.equals == 0 || value > found.value) {
-                        (found.value, found.action, found.equals) = (value, action as u32, 1);
-                    } else if offered && value >= found.value {
-                        found.equals += 1;
-                    }
-                }
-            }
-        }
-        if found.equals == 0 {
-            // Nothing comes after a state without actions.
-            found.value = 0.0;
-        }
-        self.best[state.0] = found;
-    }
-
-    pub(super) fn find_all_best(&mut self) {
-        for state in 0..self.states() {
-            self.find_best(State(state));
-        }
     }
 
     /// Checks a table and finds its best actions.

@@ -119,8 +119,7 @@ impl<L: Learner, P: Policy> Training<L, P> {
             let step = Step::new(observation, turn.reward, status);
             let (course, mut pair) = self.parts();
             let taken = (turn.running, turn.action);
-            let (running, record) = course.learn(environment, &mut pair, taken, step, rng)?;
-            course.running = running;
+            let record = course.learn(environment, &mut pair, taken, step, rng)?;
             self.curve.extend(record);
         }
         Ok(())

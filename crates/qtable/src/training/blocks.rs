@@ -10,7 +10,7 @@ use crate::policy::{Boltzmann, Policy};
 use crate::problem::Environment;
 use crate::step::{Action, State, Step};
 use crate::training::cached::CachedBoltzmann;
-use crate::training::course::{Actor, Course, Until};
+use crate::training::course::{Actor, Until};
 use crate::training::curve::Record;
 use crate::training::driver::Training;
 use crate::training::episode::check_fit;
@@ -87,13 +87,9 @@ impl Training<QLearning, Boltzmann> {
             learner: &mut self.learner,
             policy: &mut self.policy,
         };
-        let mut left = block_end(place, every, blocks) - place;
-        let is_reached = |_: &Course| {
-            let ends = left == 0;
-            left = left.saturating_sub(1);
-            ends
-        };
-        self.course.run(environment, &mut actor, is_reached, rng)
+        let most = block_end(place, every, blocks) - place;
+        let whole = Until::Episodes(u64::MAX);
+        self.course.run(environment, &mut actor, whole, most, rng)
     }
 }
 

@@ -56,7 +56,8 @@ impl Running {
 }
 
 impl Course {
-    /// Acts and learns until a record is due, which is returned, or the goal is reached.
+    /// Acts and learns, at least once, until a record is due, which is returned, or a total is
+    /// reached, or `most` actions, at least 1, are done.
     ///
     /// After an error the episode is given up; the next action begins another.
     #[inline(always)]
@@ -64,12 +65,12 @@ impl Course {
         &mut self,
         environment: &mut E,
         actor: &mut impl Actor,
-        mut is_reached: impl FnMut(&Self) -> bool,
+        until: Until,
+        mut most: u64,
         rng: &mut dyn Rng,
     ) -> Result<Option<Record>, Error> {
-        let mut running = self.running.take();
-        while !is_reached(self) {
-            let now = match running.take() {
+        loop {
+            let mut running = match self.running.take() {
                 Some(running) => running,
                 None => {
                     actor.begin_episode();
@@ -80,22 +81,63 @@ impl Course {
                     Running::at(state)
                 }
             };
-            let action = actor.choose(now.state, now.action, rng)?;
-            let step = environment.step(action, rng)?;
-            let record;
-            (running, record) = self.learn(environment, actor, (now, action), step, rng)?;
-            if record.is_some() {
-                self.running = running;
-                return Ok(record);
+            // Nothing but the end of the episode needs to be looked for within a stretch.
+            let limit = self
+                .episode_limit
+                .get()
+                .saturating_sub(running.steps)
+                .max(1);
+            let record = self
+                .record_every
+                .get()
+                .saturating_sub(self.tally.actions)
+                .max(1);
+            let left = match until {
+                Until::Actions(actions) => actions.saturating_sub(self.actions).max(1),
+                Until::Episodes(_) => u64::MAX,
+            };
+            let stretch = limit.min(record).min(left).min(most);
+            let mut taken = 0;
+            let mut act = || -> Result<Step, Error> {
+                let mut action = actor.choose(running.state, running.action.take(), rng)?;
+                loop {
+                    let mut step = environment.step(action, rng)?;
+                    if environment.is_dynamic() {
+                        actor.meet(environment, step.observation)?;
+                    }
+                    if step.status == Status::Continuing && taken + 1 == limit {
+                        step.status = Status::Truncated;
+                    }
+                    let (td_error, next) = actor.learn(running.state, action, step, rng)?;
+                    self.tally.add(step.reward, td_error);
+                    running.state = step.observation;
+                    running.sum += step.reward;
+                    taken += 1;
+                    if taken == stretch || step.status != Status::Continuing {
+                        running.action = next;
+                        return Ok(step);
+                    }
+                    action = match next {
+                        Some(next) => next,
+                        None => actor.choose(running.state, None, rng)?,
+                    };
+                }
+            };
+            let last = act();
+            most -= taken;
+            running.steps = running.steps.saturating_add(taken);
+            self.actions = self.actions.saturating_add(taken);
+            self.tally.actions = self.tally.actions.saturating_add(taken);
+            if let Some(record) = self.end_stretch(environment, running, &last?) {
+                return Ok(Some(record));
+            }
+            if most == 0 || self.has_reached(until) {
+                return Ok(None);
             }
         }
-        self.running = running;
-        Ok(None)
     }
 
-    /// Learns from the answer to an action of an episode. Returns the episode, if it goes on, and a
-    /// record, if one is due.
-    #[inline(always)]
+    /// Learns from the answer to an action of an episode. Returns a record if one is due.
     pub(super) fn learn<E: Environment + ?Sized>(
         &mut self,
         environment: &E,
@@ -103,35 +145,44 @@ impl Course {
         (running, action): (Running, Action),
         mut step: Step,
         rng: &mut dyn Rng,
-    ) -> Result<(Option<Running>, Option<Record>), Error> {
+    ) -> Result<Option<Record>, Error> {
         if environment.is_dynamic() {
             actor.meet(environment, step.observation)?;
         }
         let steps = running.steps.saturating_add(1);
-        let sum = running.sum + step.reward;
         if step.status == Status::Continuing && steps >= self.episode_limit.get() {
             step.status = Status::Truncated;
         }
-        let (td_error, next_action) = actor.learn(running.state, action, step, rng)?;
-
+        let (td_error, action) = actor.learn(running.state, action, step, rng)?;
+        self.tally.add(step.reward, td_error);
         self.actions = self.actions.saturating_add(1);
-        self.tally.add_action(step.reward, td_error);
-        let goes_on = step.status == Status::Continuing;
-        let next = goes_on.then_some(Running {
+        self.tally.actions = self.tally.actions.saturating_add(1);
+        let running = Running {
             state: step.observation,
-            action: next_action,
+            action,
             steps,
-            sum,
-        });
-        if !goes_on {
+            sum: running.sum + step.reward,
+        };
+        Ok(self.end_stretch(environment, running, &step))
+    }
+
+    /// Keeps an episode if it goes on after its last step, and counts it otherwise. Returns a
+    /// record if one is due.
+    fn end_stretch<E: Environment + ?Sized>(
+        &mut self,
+        environment: &E,
+        running: Running,
+        last: &Step,
+    ) -> Option<Record> {
+        if last.status == Status::Continuing {
+            self.running = Some(running);
+        } else {
             self.episodes = self.episodes.saturating_add(1);
-            let success = environment.succeeded(&step);
-            self.tally.add_episode(steps, sum, success);
+            let success = environment.succeeded(last);
+            self.tally.add_episode(running.steps, running.sum, success);
         }
         let due = self.tally.actions >= self.record_every.get();
-        let record =
-            due.then(|| std::mem::take(&mut self.tally).record(self.actions, self.episodes));
-        Ok((next, record))
+        due.then(|| std::mem::take(&mut self.tally).record(self.actions, self.episodes))
     }
 
     /// Returns `true` once a total is reached.

@@ -38,8 +38,9 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    pub(super) fn add_action(&mut self, reward: f64, td_error: f64) {
-        self.actions = self.actions.saturating_add(1);
+    /// Adds what an action brought; the caller counts the actions.
+    #[inline(always)]
+    pub(super) fn add(&mut self, reward: f64, td_error: f64) {
         self.reward += reward;
         self.td_error += td_error.abs();
     }

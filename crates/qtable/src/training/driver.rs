@@ -13,7 +13,7 @@ use crate::step::{Action, State, Status, Step};
 use crate::table::QTable;
 use crate::training::course::{Actor, Course, Until};
 use crate::training::curve::{Record, Tally};
-use crate::training::episode::{check_choice, check_fit};
+use crate::training::episode::check_fit;
 
 /// A training run: table, learner, policy, counters, learning curve, and the episode that is going
 /// on.
@@ -168,10 +168,10 @@ impl<L: Learner, P: Policy> Training<L, P> {
         mut on_record: impl FnMut(&Record, &mut Self) -> ControlFlow<()>,
     ) -> Result<bool, Error> {
         check_fit(environment, &self.table)?;
-        let is_reached = |course: &Course| course.has_reached(until);
-        loop {
+        while !self.course.has_reached(until) {
             let (course, mut pair) = self.parts();
-            let Some(record) = course.run(environment, &mut pair, is_reached, &mut rng)? else {
+            let Some(record) = course.run(environment, &mut pair, until, u64::MAX, &mut rng)?
+            else {
                 return Ok(false);
             };
             self.curve.push(record);
@@ -179,6 +179,7 @@ impl<L: Learner, P: Policy> Training<L, P> {
                 return Ok(true);
             }
         }
+        Ok(false)
     }
 
     /// Returns the counters beside the policy and the learner on their table.
@@ -279,7 +280,7 @@ impl<L: Learner, P: Policy> Actor for Pair<'_, L, P> {
         let action = match before {
             Some(action) => action,
             None => {
-                check_choice(self.table, state)?;
+                self.table.prepare(state)?;
                 self.policy.choose(self.table, state, rng)
             }
         };

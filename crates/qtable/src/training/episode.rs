@@ -19,16 +19,6 @@ pub(super) fn check_fit<E: Environment + ?Sized>(
     table.check_shape("the environment", (states, actions))
 }
 
-/// Refuses a state outside the table, or one without an action to choose.
-#[inline(always)]
-pub(super) fn check_choice(table: &QTable, state: State) -> Result<(), Error> {
-    table.check_state(state)?;
-    if table.equals(state) > 0 {
-        return Ok(());
-    }
-    Err(Error::NoActionAllowed(state))
-}
-
 /// Plays one episode of at most `limit` steps, from its first state to the last step.
 pub(super) fn play<E: Environment + ?Sized>(
     environment: &mut E,
@@ -47,7 +37,7 @@ pub(super) fn play<E: Environment + ?Sized>(
         if step.status != Status::Continuing || taken == limit {
             return table.check_state(state);
         }
-        check_choice(table, state)?;
+        table.prepare(state)?;
         let action = choose(table, state, rng);
         table.check_choice(state, action)?;
         step = environment.step(action, rng)?;

