@@ -47,7 +47,7 @@ impl BallDetector {
         Self::StandardHough,
     ];
 
-    /// Returns its name on the command line.
+    /// Returns the detector's name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::AContrario => "a-contrario",
@@ -66,8 +66,8 @@ impl BallDetector {
         self.build_for(FRAME_WIDTH, 1.0, seed)
     }
 
-    /// Builds the detector for frames `width` pixels wide and a ball `size` times as large as that
-    /// of 20 mm radius.
+    /// Builds the detector for frames `width` pixels wide and a ball with a radius of `size` times
+    /// 20 mm.
     ///
     /// # Errors
     /// A size for which there are no radii.

@@ -414,13 +414,13 @@ const STEP_GAIN: f32 = 2.3;
 const NOISE_FACTOR: f32 = 3.5;
 /// Noise that rounding adds at each size, gray levels.
 const ROUNDING: f32 = 0.3;
-/// Time to list the edges, in times to find them: of none, and for each pixel that is one in
-/// addition.
+/// Time to list the edges of a frame, in units of the time to find them: a constant, and a factor
+/// of the fraction of pixels that are edges.
 const LISTING: (f64, f64) = (0.3, 8.0);
 /// Circles about one place that differ noticeably, at each size.
 const RADII: usize = 12;
 
-/// Runs both, each on a thread of its own if `apart` and the feature `parallel` are set.
+/// Runs two functions, on two threads if `apart` is set and the feature `parallel` is on.
 fn both(apart: bool, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
     #[cfg(feature = "parallel")]
     if apart {

@@ -12,9 +12,9 @@ pub enum Error {
     /// action index does not fit into 32 bits.
     #[error("{states} states and {actions} actions make {problem}")]
     Shape {
-        /// States asked for.
+        /// Requested number of states.
         states: usize,
-        /// Actions asked for.
+        /// Requested number of actions.
         actions: usize,
         /// The problem.
         problem: &'static str,
@@ -50,7 +50,7 @@ pub enum Error {
     /// An action that the state does not offer.
     #[error("action {} is not allowed in state {}", .1.0, .0.0)]
     ActionNotAllowed(State, Action),
-    /// A state without actions in which an episode goes on.
+    /// The episode continues in a state that offers no action.
     #[error("state {} offers no action, but the episode goes on there", .0.0)]
     NoActionAllowed(State),
     /// A reward or a value that is NaN or infinite, or that a cached table cannot hold as `f32`.

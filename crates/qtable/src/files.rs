@@ -24,7 +24,7 @@ const NAME_LIMIT: usize = 255;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
-    /// The path, before the error.
+    /// An error and the file that it is about.
     #[error("{}: {error}", path.display())]
     At {
         /// The file.
@@ -40,7 +40,7 @@ pub enum FileError {
     /// damaged in transfer as text.
     #[error("not a file of this format (it does not begin with its signature)")]
     Signature,
-    /// A file of a later version of this crate, with its format.
+    /// A file of a later version of this crate. The number is that of its format.
     #[error("made by a later version (format {0}, read here: {FORMAT}): update this program")]
     Newer(u32),
     /// A file of an earlier version of this crate, whose contents are laid out differently.

@@ -233,7 +233,7 @@ fn without_losses(
     fewest: usize,
     mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
 ) -> Result<(Trials, QTable), BehaviourError> {
-    /// The action that replaces another may lose the ball as well.
+    /// Most rounds of replacing actions that lose the ball: a replacement may lose it as well.
     const ROUNDS: usize = 5;
     let mut tried = Trials::of(starts, &behaviour, &mut simulate);
     for _ in 0..ROUNDS {

@@ -43,7 +43,7 @@ struct Learning {
 }
 
 impl Learning {
-    /// Goes on after so many draws.
+    /// Resumes learning after `draws` random numbers were drawn.
     fn after(settings: OnlineLearning, draws: u64) -> Result<Self, qtable::Error> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
         for _ in 0..draws {

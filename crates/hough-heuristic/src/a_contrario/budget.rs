@@ -7,8 +7,8 @@ use crate::clock;
 
 /// Looks that a draw takes on average over dense texture. All draws share their looks.
 const LOOKS_PER_DRAW: u64 = 16;
-/// Smaller frames get the budget of this many million pixels, since a circle costs as much in
-/// each.
+/// Least size that a budget is computed for, million pixels: a circle costs as much in a small
+/// frame as in a large one.
 const LEAST_MEGAPIXELS: f64 = 0.25;
 
 /// Cost of a look at all edges around a circle, in looks.
@@ -23,7 +23,8 @@ const CIRCLE: u64 = 2 * PROOF + MEASURING + 3500;
 /// Draws that go with them.
 const DRAWS_PER_CIRCLE: u64 = 50;
 
-/// The parts of the work, each with looks of its own after those of the parts before it.
+/// Part of the work. Each part has a budget of looks of its own, which begins where that of the
+/// part before it ends.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Stage {
     Search,
@@ -35,7 +36,7 @@ pub(super) enum Stage {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Budget {
     pub(super) draws: u64,
-    /// Places looked at, or what takes as long as that.
+    /// Work done, in units of the time to look at one place.
     pub(super) looks: u64,
     most_draws: u64,
     /// By [`Stage`].

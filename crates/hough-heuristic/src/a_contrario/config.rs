@@ -107,7 +107,7 @@ impl AContrarioConfig {
         self.max_radius.filter(|max| self.min_radius >= *max)
     }
 
-    /// The range of radii for a frame of this size.
+    /// Returns the smallest and the largest radius for a frame of this size.
     pub(super) fn radii(&self, width: u32, height: u32) -> (f64, f64) {
         let part = |width: u32, height: u32| LARGEST * f64::from(width.min(height));
         let by_frame = part(width, height);

@@ -16,7 +16,7 @@ const LEAST_REACH: usize = 3;
 const MOST_REACH: usize = 8;
 /// Reach of the first search, around the candidate, which is not exact, pixels.
 const FIRST_REACH: usize = 6;
-/// Samples that lie so far apart along the outline do not overlap, pixels.
+/// Spacing of samples along the outline at which they do not overlap, pixels.
 const SPACING: f32 = 2.5;
 /// Distance of independent samples as a share of the length over which slopes are averaged. At 0.75
 /// noise alone made five times as many circles; at 1 a tenth of the circles in noise of 40 gray
@@ -87,7 +87,7 @@ pub(super) struct Proof {
 }
 
 impl Proof {
-    /// Returns `true` if it explains the edge points on it.
+    /// Returns `true` if the circle explains the edge points that lie on it.
     pub(super) fn is_beyond_doubt(&self) -> bool {
         self.certainty >= BEYOND_DOUBT
             || (self.certainty >= HALF_SURE && self.covered >= ALL_BUT_COVERED)
@@ -355,9 +355,9 @@ fn settle(
     Some(weigh(polar, &edges, ring, setting, window, width < CRISP))
 }
 
-/// Moves the outline `from` to the edges sampled around `start`, in one step for each of `foci`,
-/// the largest distance at which edges count, pixels. Returns the outline and the number of edges
-/// that counted last.
+/// Fits the outline `from` to the edges sampled around `start`, in one step for each entry of
+/// `foci`: the largest distance at which an edge counts, pixels. Returns the outline and the
+/// number of edges that counted in the last step.
 #[inline(always)]
 fn improve(
     rays: Rays<'_>,

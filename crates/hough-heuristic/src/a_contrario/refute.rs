@@ -52,7 +52,7 @@ struct Around<'a> {
     noise: f32,
     /// Deviation of the noise of averaged levels.
     level_noise: f32,
-    /// Changes of the levels inside and outside along the outline where nothing begins.
+    /// Usual changes of the levels along the outline, inside and outside.
     uneven: [f32; 2],
     /// The outline's sign, slope and contrast.
     sign: f32,

@@ -345,7 +345,7 @@ impl Search<'_> {
         }
     }
 
-    /// Looks at the circle and keeps it if it is worth it; true if it explains its points.
+    /// Checks the circle and keeps it if it qualifies. Returns `true` if it explains its points.
     #[inline(always)]
     pub(super) fn consider(
         &self,

@@ -5,8 +5,8 @@ use crate::edges::EdgePixel;
 impl Curve for Circle {
     const PARAMETERS: usize = 3;
 
-    /// The circle through three pixels; none if two are nearer than 3 px or the three lie in a
-    /// line.
+    /// Returns the circle through three pixels, or `None` if two of them are nearer than 3 px or
+    /// the three lie in a line.
     fn through(pixels: &[EdgePixel]) -> Option<Self> {
         let &[a, b, c] = pixels else {
             return None;

@@ -11,7 +11,7 @@ use crate::error::{ConfigError, require};
 /// The largest threshold: no gradient is steeper.
 pub(super) const MAX_THRESHOLD: f32 = 1141.0;
 
-/// Low threshold in noise, as a share of the high one.
+/// Least low threshold in noise, as a fraction of the high one.
 const LOW_FLOOR: f32 = 0.6;
 
 /// The settings of [`Canny`].

@@ -160,7 +160,7 @@ struct Window {
     count: u32,
 }
 
-/// A whole number in `0..count`, for a `count` of at most 2^32.
+/// Draws a whole number from `0..count`, where `count` is at most 2^32.
 fn below(count: u64, rng: &mut impl Rng) -> usize {
     ((u64::from(rng.next_u32()) * count) >> 32) as usize
 }

@@ -206,8 +206,8 @@ impl Pass<'_> {
         Some(Detection { circle, score })
     }
 
-    /// The circle fitted to the edge points around it, at first to those within `reach` pixels;
-    /// none if the fit fails or leads nowhere.
+    /// Returns the circle fitted to the edge points around it, at first to those within `reach`
+    /// pixels, or `None` if the fit fails or leads nowhere.
     fn fitted(&mut self, circle: Circle, reach: f64) -> Option<Circle> {
         let band = self.accept.tolerance + 0.5;
         let (min, max) = (self.accept.min_radius, self.accept.max_radius);

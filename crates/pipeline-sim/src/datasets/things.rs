@@ -5,7 +5,7 @@ use rand::{Rng, RngExt};
 
 use crate::render::scene::{Appearance, Light, Occluder, Shape, Thing};
 
-/// Draws one to three lamps, at most `steepest` (tangent) off the vertical.
+/// Draws one to three lamps. `steepest` is the tangent of the largest angle from the vertical.
 pub(super) fn lamps(steepest: f64, rng: &mut dyn Rng) -> Vec<Light> {
     let count = rng.random_range(1..=3);
     let total = rng.random_range(0.65..0.95);
@@ -78,7 +78,7 @@ pub(super) fn things(count: usize, tall: bool, rng: &mut dyn Rng) -> Vec<Thing> 
     things
 }
 
-/// Draws turn and surface of a thing; paper is white and even.
+/// Draws the turn and the surface of a thing. Paper is white and even.
 pub(super) fn placed(shape: Shape, (x, y): (f64, f64), rng: &mut dyn Rng) -> Thing {
     let turn = rng.random_range(0.0..std::f64::consts::TAU);
     let (albedo, texture) = if matches!(shape, Shape::Print { .. }) {

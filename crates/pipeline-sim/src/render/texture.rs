@@ -49,8 +49,8 @@ impl Level {
         }
     }
 
-    /// Returns the index of the texel of the half texel below (u, v), in 2^32ths of the side, with
-    /// [`HALF_U`] and [`HALF_V`].
+    /// Returns the index of the texel at (u, v), which are in 2^32ths of the side, and in the bits
+    /// [`HALF_U`] and [`HALF_V`] the half of it that they lie in.
     #[inline(always)]
     fn place(u: u32, v: u32, bits: u32) -> u32 {
         let (column, row) = (u >> (32 - bits), v >> (32 - bits));

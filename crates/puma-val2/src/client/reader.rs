@@ -3,11 +3,11 @@
 /// End of a reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Ending {
-    /// With the idle monitor's prompt.
+    /// Prompt of an idle monitor.
     Idle,
-    /// With the prompt of a monitor under which a program runs.
+    /// Prompt of a monitor while a program runs.
     Running,
-    /// With a question.
+    /// A question.
     Question,
 }
 

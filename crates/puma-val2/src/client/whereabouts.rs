@@ -18,9 +18,9 @@ pub struct Location {
 }
 
 impl Location {
-    /// Parses the reply to `WHERE`: by its headings in either order, or, where none are found, by
-    /// counting from the end (six joint angles, before them six numbers of a heading, before them X
-    /// Y Z O A T). `None` if neither fits.
+    /// Parses the reply to `WHERE`, whose two headings may come in either order. Without headings,
+    /// numbers are counted from the end: six joint angles, before them six numbers of a heading,
+    /// before them X Y Z O A T. Returns `None` if neither fits.
     pub fn parse(reply: &str) -> Option<Self> {
         Self::by_headings(reply).or_else(|| {
             let has_heading = reply
@@ -84,7 +84,7 @@ impl Location {
 }
 
 impl Location {
-    /// Returns the tool alone and the base alone that would explain the pose.
+    /// Returns two explanations of the pose: a tool without a base, and a base without a tool.
     pub(crate) fn explanations(&self, arm: &PumaParams) -> [Frames; 2] {
         let (flange, hand) = (arm.forward(&self.joints), self.hand.pose());
         let tool = Frames {

@@ -317,8 +317,8 @@ const EMPTY: Solution = Solution {
     },
 };
 
-/// Returns zero for a negative difference of squares that rounding explains: at the border of the
-/// reach the arm is exactly stretched.
+/// Returns the difference of squares, or zero if it is negative by no more than rounding explains,
+/// as for a stretched arm at the border of its reach.
 fn beyond_rounding(difference: f64, of: f64) -> f64 {
     if difference < 0.0 && difference > -1e-12 * of {
         0.0

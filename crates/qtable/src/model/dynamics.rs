@@ -66,7 +66,7 @@ validated! {
     pub struct Model {
         pub(super) states: usize,
         pub(super) actions: usize,
-        /// Start of the outcomes of each pair, and one more for the end.
+        /// Index of the first outcome of each pair, and at the end the number of all outcomes.
         starts: Vec<usize>,
         outcomes: Vec<Outcome>,
         pub(super) most_sweeps: u64,

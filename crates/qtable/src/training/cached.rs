@@ -437,9 +437,8 @@ impl Head {
     }
 }
 
-/// Returns the number of sums that are not beyond a point, none of them negative. Such
-/// floating-point numbers are ordered as their bits are, and integers are compared fast with
-/// vectors and without.
+/// Returns the number of sums up to `point`. No sum is negative, so that comparing their bits as
+/// integers gives the order of the numbers, and is fast with and without vectors.
 #[inline(always)]
 fn count_up_to(sums: &[f32], point: f32) -> usize {
     let point = point.to_bits() as i32;

@@ -46,7 +46,7 @@ const fn steps(times: f64) -> [f64; LEARNED] {
     ]
 }
 
-/// Step of the derivatives by a coordinate, metres.
+/// Step of numerical derivatives with respect to a coordinate, metres.
 pub(crate) const METRE_STEP: f64 = 1e-6;
 
 pub(crate) type ThreeBy<const N: usize> = SMatrix<f64, 3, N>;

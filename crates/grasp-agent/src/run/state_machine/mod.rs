@@ -390,7 +390,7 @@ enum View {
     Barred,
 }
 
-/// The ball was in view `from` this pose, and is not any more.
+/// Returns the state after a ball, last seen from the pose `from`, is out of view.
 fn lost(ball: Sighting, from: Joints) -> State {
     State::Recover {
         ball,

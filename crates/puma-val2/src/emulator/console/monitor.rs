@@ -444,7 +444,7 @@ impl Emulator {
         self.set_switches(&names, on)
     }
 
-    /// Sets switches, all of which there must be.
+    /// Sets switches, or none of them if one is unknown.
     pub(crate) fn set_switches(&mut self, names: &[String], on: bool) -> Result<(), Fault> {
         if !names.iter().all(|name| SWITCHES.contains(&name.as_str())) {
             return Err(Message::UnknownSwitch.into());
