@@ -95,7 +95,7 @@ use thin::Thinning;
 ///
 /// **Several circles.** Circles may lie inside one another and across one another. Each must be
 /// proven by edges that no surer circle explains, and its outline must differ from any other by 3
-/// px and 4 % of the radius.
+/// px and 4 % of the radius. Next to a proven outline the other one of a thin ring is sought.
 ///
 /// **Measurement.** The circle is followed down to the full size (in strong noise to half of it)
 /// and fitted there, weighted by the slope. The inward bias that blur gives a ball that darkens
@@ -359,6 +359,7 @@ impl AContrario {
                 found.settle(None, &candidate, &mut prover, &mut self.budget);
             }
         }
+        found.prove_parallels(&mut prover, &mut self.budget);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Circles that passed the first looks, waiting for a closer one.
 
-use super::budget::Budget;
+use super::budget::{Budget, Stage};
 use super::chance::log10;
 use super::polar::Ring;
 use super::prover::Prover;
@@ -8,6 +8,9 @@ use super::search::Support;
 
 /// Number of meetings with a circle after which it is skipped.
 const MEETINGS: u32 = 3;
+
+/// Covered share of an outline that only its distance from a proven one suggests.
+const LEAST_PARALLEL: f32 = 0.8;
 
 /// A circle found at some level, in pixels of the frame.
 #[derive(Clone, Copy, Debug)]
@@ -181,7 +184,7 @@ impl Collected {
         proven.move_to(&ring);
         // Drawn to the stronger edges of another outline: this one may still be there.
         if let Some(known) = self.known(&proven, budget) {
-            let ring = prover.prove_narrowly(candidate, &known, &mut budget.looks)?;
+            let ring = prover.prove_narrowly(candidate, &known, 0.0, &mut budget.looks)?;
             proven.move_to(&ring);
             if self.is_proven(&proven, budget) {
                 return Some(ring);
@@ -193,5 +196,34 @@ impl Collected {
         self.proven.push(proven);
         budget.grant();
         Some(proven.ring())
+    }
+
+    /// Proves the other outlines of the rings and wide lines whose one outline is proven.
+    pub(super) fn prove_parallels(&mut self, prover: &mut Prover<'_>, budget: &mut Budget) {
+        for index in 0..prover.proofs.len() {
+            if budget.is_late() || budget.is_over(Stage::Proofs) {
+                return;
+            }
+            let proof = prover.proofs[index];
+            if !proof.is_beyond_doubt() {
+                continue;
+            }
+            let Some([one, other]) = prover.parallel(&proof, &mut budget.looks) else {
+                continue;
+            };
+            for (ring, beside) in [(one, other), (other, one)] {
+                let candidate = Candidate::new(&ring, 1.0, Support::default());
+                let looks = &mut budget.looks;
+                if self.proven.iter().any(|known| known.coincides(&candidate)) {
+                    continue;
+                }
+                let proven = prover.prove_narrowly(&candidate, &beside, LEAST_PARALLEL, looks);
+                if let Some(ring) = proven {
+                    self.proven
+                        .push(Candidate::new(&ring, 1.0, Support::default()));
+                    budget.grant();
+                }
+            }
+        }
     }
 }

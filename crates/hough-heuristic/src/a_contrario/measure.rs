@@ -4,6 +4,8 @@
 use super::directions::{Rays, UnitCircle};
 use super::fit::Moments;
 use super::polar::{Gray, LANES, Polar, Ring};
+use super::proof::Proof;
+use super::strongest::RAYS;
 
 /// A circle as measured.
 #[derive(Clone, Copy, Debug, Default)]
@@ -89,17 +91,17 @@ struct Steepest {
     weight: [f32; MOST],
 }
 
-/// Measures the ring on ever finer frames, the finest last; `None` where it gets lost.
+/// Measures a proven circle on ever finer frames, the finest last; `None` where it gets lost.
 #[inline(always)]
 pub(super) fn measure<'a>(
     frames: impl Iterator<Item = Gray<'a>>,
     circle: &UnitCircle,
     polar: &mut Polar,
-    start: Ring,
+    proof: &Proof,
     noise: f32,
 ) -> Option<Measured> {
     let mut measured = Measured {
-        ring: start,
+        ring: proof.ring,
         ..Measured::default()
     };
     let mut frames = frames.peekable();
@@ -139,7 +141,7 @@ pub(super) fn measure<'a>(
             } else {
                 f32::INFINITY
             };
-            let steepest = Steepest::on(polar, focus, doubtful);
+            let steepest = Steepest::on(polar, proof, focus, doubtful);
             let step = steepest.fit(rays.x, rays.y, focus)?;
             measured.ring.x += step.x;
             measured.ring.y += step.y;
@@ -273,20 +275,34 @@ fn weight_of(slope: f32, doubtful: f32) -> f32 {
 
 impl Steepest {
     #[inline(always)]
-    fn on(polar: &Polar, focus: f32, doubtful: f32) -> Self {
+    fn on(polar: &Polar, proof: &Proof, focus: f32, doubtful: f32) -> Self {
         let count = polar.rays;
+        // Where the proof has an edge only those of its direction count: another outline may be
+        // close by.
+        let signs: [_; RAYS] = std::array::from_fn(|ray| {
+            let bit = |bits: u64| (bits >> ray & 1) as u8;
+            let sign = 2.0 * f32::from(bit(proof.brighter)) - 1.0;
+            (sign, f32::from(1 - bit(proof.hits)))
+        });
         let mut steepest = Self {
             distance: [0.0; MOST],
             weight: [0.0; MOST],
         };
         for block in 0..count.min(MOST) / LANES {
             let (mut best, mut at) = ([0.0f32; LANES], [0i32; LANES]);
+            let signs: [_; LANES] =
+                std::array::from_fn(|lane| signs[(block * LANES + lane) * RAYS / count]);
             // The slope where it is best, and a step before and behind; all three the same at the
             // ends of the ray.
             let slopes = |step: usize| {
                 let row: &[f32; LANES] =
                     &polar.outward[step * count..][..count].as_chunks().0[block];
-                row.map(f32::abs)
+                let mut slopes = [0.0; LANES];
+                for lane in 0..LANES {
+                    let (sign, either) = signs[lane];
+                    slopes[lane] = (sign * row[lane]).max(either * row[lane].abs());
+                }
+                slopes
             };
             let first = slopes(0);
             let [mut before, mut here, mut behind] = [first; 3];

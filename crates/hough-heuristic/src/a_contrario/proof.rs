@@ -74,6 +74,8 @@ pub(super) struct Proof {
     pub(super) visible: f32,
     /// A bit for each ray whose strongest edge lies on the outline.
     pub(super) hits: u64,
+    /// A bit for each ray whose strongest edge is brighter outside.
+    pub(super) brighter: u64,
     /// Largest distance of those edges from it, pixels of the level.
     pub(super) slack: f32,
     /// The chance of that on one ray.
@@ -422,8 +424,10 @@ fn weigh(
     let edges_found = edges.slope.iter().filter(|&&slope| slope > 0.0).count() as f32;
     let rays = edges_found + NO_EDGE * (visible - edges_found);
     let independent = (arc / apart).min(1.0) * rays;
+    let brighter = |bits: u64, (ray, sign): (usize, &f32)| bits | u64::from(*sign > 0.0) << ray;
     let mut best = Proof {
         ring,
+        brighter: edges.sign.iter().enumerate().fold(0, brighter),
         certainty: f32::NEG_INFINITY,
         visible: visible / RAYS as f32,
         rays,

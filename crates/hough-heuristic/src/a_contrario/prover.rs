@@ -35,6 +35,11 @@ const SECOND_LOOK: f32 = 1.0;
 /// Least certainty of a circle for which evidence against it is sought.
 const LEAST_REFUTED: f32 = 0.5;
 
+/// Least distance of a parallel outline, pixels of the size where it is sought.
+const LEAST_PARALLEL: f32 = 2.0;
+/// Least mean slope of a parallel outline, in slopes of the proven one.
+const PARALLEL: f32 = 0.4;
+
 /// The frame and its repeated halvings.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pyramid<'a> {
@@ -131,6 +136,7 @@ impl Prover<'_> {
         &mut self,
         candidate: &Candidate,
         other: &Ring,
+        least_covered: f32,
         looks: &mut u64,
     ) -> Option<Ring> {
         let reach = 0.5 * candidate.ring().apart(other);
@@ -139,8 +145,51 @@ impl Prover<'_> {
             depth -= 1;
         }
         let narrow = Narrow::Beside(*other);
-        let proof = self.prove_at(depth, &candidate.ring(), Some(narrow), looks);
+        let proof = self
+            .prove_at(depth, &candidate.ring(), Some(narrow), looks)
+            .filter(|proof| proof.covered >= least_covered);
         self.conclude(Proof::better(None, proof, SECOND_LOOK)?, looks)
+    }
+
+    /// A proven circle as its steepest outline on the whole, and the outline parallel to that, if
+    /// there is one: of a ring or of a wide line.
+    pub(super) fn parallel(&mut self, proof: &Proof, looks: &mut u64) -> Option<[Ring; 2]> {
+        *looks += ROUND;
+        let ring = proof.in_frame();
+        let depth = self.depth_for(ring.r).saturating_sub(1);
+        let scale = (1 << depth) as f32;
+        let ring = ring.shrunk(scale);
+        let window = proof::window_for(&ring, self.noise / scale + 0.3);
+        let rays = self.circle.rays(RAYS);
+        let gray = self.pyramid.gray(depth);
+        self.polar
+            .sample(gray, rays, &ring, window.reach, window.half);
+        let polar = &*self.polar;
+        let steepest = |beside: Option<f32>| {
+            let far = |off: f32| beside.is_none_or(|other| (off - other).abs() >= LEAST_PARALLEL);
+            polar
+                .outward
+                .chunks_exact(RAYS)
+                .enumerate()
+                .map(|(step, slopes)| {
+                    (
+                        slopes.iter().sum::<f32>().abs(),
+                        polar.distance(step as f32),
+                    )
+                })
+                .filter(|&(_, off)| far(off))
+                .max_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let own = steepest(None)?;
+        let other = steepest(Some(own.1)).filter(|other| other.0 >= PARALLEL * own.0)?;
+        let at = |off: f32| {
+            Ring {
+                r: ring.r + off,
+                ..ring
+            }
+            .grown(scale)
+        };
+        Some([at(own.1), at(other.1)])
     }
 
     /// Weighs the evidence against a circle, and keeps the proof.

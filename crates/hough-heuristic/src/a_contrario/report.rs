@@ -147,8 +147,8 @@ impl Vectorized for Measuring<'_> {
             .rev()
             .map(|depth| pyramid.gray(depth));
         let scale = (1 << finest) as f32;
-        let (start, noise) = (self.proof.ring, self.noise / scale);
-        measure::measure(frames, self.circle, self.polar, start, noise)
+        let noise = self.noise / scale;
+        measure::measure(frames, self.circle, self.polar, self.proof, noise)
             .map(|measured| measured.grown(scale))
     }
 }

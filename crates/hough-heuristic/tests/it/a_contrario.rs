@@ -129,22 +129,22 @@ fn found_of(kind: &Kind, seed: u64, frames: u64) -> (usize, usize) {
 
 #[test]
 fn balls_in_noise_are_found() {
-    for (noise, least) in [(10.0, 23), (25.0, 23), (40.0, 21)] {
-        let (hits, others) = found_of(&Kind { noise, ..ONE }, 21, 24);
+    for (noise, least) in [(10.0, 11), (25.0, 11), (40.0, 10)] {
+        let (hits, others) = found_of(&Kind { noise, ..ONE }, 21, 12);
         assert!(
             hits >= least && others <= 1,
-            "noise {noise}: {hits} of 24, and {others}"
+            "noise {noise}: {hits} of 12, and {others}"
         );
     }
 }
 
 #[test]
 fn balls_that_are_hidden_in_part_or_moved_are_found() {
-    for (difficulty, seed, least) in [(Difficulty::Occluded, 1, 25), (Difficulty::Moving, 3, 29)] {
-        let (hits, others) = found_of(&Kind { difficulty, ..ONE }, seed, 30);
+    for (difficulty, seed, least) in [(Difficulty::Occluded, 1, 12), (Difficulty::Moving, 3, 14)] {
+        let (hits, others) = found_of(&Kind { difficulty, ..ONE }, seed, 15);
         assert!(
             hits >= least && others <= 1,
-            "{difficulty:?}: {hits} of 30, and {others}"
+            "{difficulty:?}: {hits} of 15, and {others}"
         );
     }
 }

@@ -32,8 +32,8 @@ fn the_score_means_what_it_says() {
             .filter(|m| m.score >= 0.5)
             .count();
     }
-    // A third of what the score permits.
-    assert!(sure <= frames as usize / 30, "{sure} sure alarms");
+    // A sixth of what the score permits; 600 other frames have 5.
+    assert!(sure <= frames as usize / 60, "{sure} sure alarms");
     assert!(
         alarms <= frames as usize / 10 + 4,
         "{alarms} alarms in {frames} frames"

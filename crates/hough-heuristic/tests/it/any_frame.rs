@@ -70,7 +70,7 @@ fn every_small_size_and_every_flat_frame_passes() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(32))]
+    #![proptest_config(ProptestConfig::with_cases(12))]
 
     #[test]
     fn any_bytes_are_a_frame(

@@ -3,7 +3,7 @@
 
 use circle_scenes::scene::same;
 use hough_heuristic::image::{GrayImage, Luma, imageops};
-use hough_heuristic::{AContrario, AContrarioConfig, Circle, CircleDetector};
+use hough_heuristic::{AContrario, AContrarioConfig, Circle, CircleDetector, Detection};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
@@ -267,6 +267,56 @@ fn a_disc_of_which_a_third_shows_beside_a_box_is_found() {
             }
         });
         assert_found("behind a box", &frame, &[disc]);
+    }
+}
+
+/// A wall of a tenth of the radius is a pixel or two wide where its outlines are proven.
+#[test]
+fn both_outlines_of_a_thin_ring_are_circles() {
+    for (x, outer, inner) in [(100.0, 80.0, 72.0), (99.5, 60.0, 54.0), (100.0, 40.0, 36.0)] {
+        let (outer, inner) = (circle(x, 101.0, outer), circle(x, 101.0, inner));
+        let frame = PLAIN.draw(|x, y| {
+            if within(&inner, x, y) {
+                225.0
+            } else if within(&outer, x, y) {
+                60.0
+            } else {
+                160.0
+            }
+        });
+        assert_found("thin ring", &frame, &[outer, inner]);
+    }
+}
+
+/// The fit to all steep edges ends between the outlines of the two.
+#[test]
+fn a_small_ball_before_a_brighter_disc_is_found() {
+    let picture = Picture { side: 100, ..PLAIN };
+    for (radius, behind, away, contrast, shade) in [
+        (12.0, 12.0, 6.4, 45.0, 0.1),
+        (12.0, 14.4, 6.4, 55.0, 0.1),
+        (14.5, 14.5, 6.7, 45.0, 0.1),
+        (14.5, 17.4, 7.7, 55.0, 0.6),
+    ] {
+        for shift in [0.0, 0.5] {
+            let ball = circle(47.0 + shift, 50.0, radius);
+            let behind = circle(ball.x + away, ball.y, behind);
+            let frame = picture.draw(|x, y| {
+                if within(&ball, x, y) {
+                    80.0 + contrast * (1.0 - shade * (x - ball.x) / radius)
+                } else if within(&behind, x, y) {
+                    220.0 - contrast
+                } else {
+                    80.0
+                }
+            });
+            for (view, (turned, place)) in views(&frame).iter().enumerate() {
+                let mut detector = detector(8.0, 95.0);
+                let found = detector.detect(turned).unwrap();
+                let is_ball = |one: &Detection| same(&one.circle, &place(&ball), 2.0);
+                assert!(found.iter().any(is_ball), "view {view}: {found:?}");
+            }
+        }
     }
 }
 
