@@ -4,11 +4,18 @@
 mod files;
 mod newest;
 mod stream;
+#[cfg(all(feature = "v4l2", target_os = "linux"))]
+mod video;
+#[cfg(all(feature = "v4l2", not(target_os = "linux")))]
+#[path = "frame/video/none.rs"]
+mod video;
 mod y4m;
 
 #[cfg(feature = "files")]
 pub use files::{Channel, ImageFiles};
 pub use stream::FrameStream;
+#[cfg(feature = "v4l2")]
+pub use video::VideoDevice;
 pub use y4m::Y4mWriter;
 
 use image::GrayImage;

@@ -46,9 +46,9 @@
 //! # Frames
 //!
 //! A [`FrameSource`] delivers frames: `ImageFiles` (feature `files`, on by default) from files and
-//! folders, [`FrameStream`] from any reader, so also from a camera through a pipe. A frame in
-//! memory whose rows are padded becomes a [`GrayImage`](image::GrayImage) by
-//! [`FlatSamples`](image::FlatSamples).
+//! folders, [`FrameStream`] from any reader, so also from a camera through a pipe, `VideoDevice`
+//! (feature `v4l2`) from a camera of Linux by name. A frame in memory whose rows are padded becomes
+//! a [`GrayImage`](image::GrayImage) by [`FlatSamples`](image::FlatSamples).
 //!
 //! # Conventions
 //!
@@ -102,6 +102,8 @@ pub use detect::{CircleDetector, Detection, FrameRefused};
 pub use edges::ImageprocCanny;
 pub use edges::{Canny, CannyConfig, EdgeDetector, EdgeMap, EdgePixel, Vectorized};
 pub use error::ConfigError;
+#[cfg(feature = "v4l2")]
+pub use frame::VideoDevice;
 #[cfg(feature = "files")]
 pub use frame::{Channel, ImageFiles};
 pub use frame::{FrameError, FrameSource, FrameStream, Y4mWriter};
