@@ -3,6 +3,7 @@
 use std::fs::{self, File};
 use std::io::{self, BufReader, Read};
 use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -15,15 +16,17 @@ use hough_heuristic::{FrameError, FrameSource, FrameStream};
 /// A thread reads all frames and keeps the newest, so that no buffer fills with old ones. A grab
 /// waits for a frame that arrives at least [`LiveCamera::delay`] after the call: with a camera that
 /// needs no longer than this from exposure to delivery, the frame was exposed after the call, as
-/// [`FrameSource`] demands.
+/// [`FrameSource`] demands. Setting the flag `stop` ends the wait for a frame with an error.
 ///
 /// ```no_run
+/// use std::sync::Arc;
+///
 /// use puma_grasp::LiveCamera;
 /// use puma_grasp::hough_heuristic::{FrameSource, image::GrayImage};
 ///
 /// fn main() -> Result<(), Box<dyn std::error::Error>> {
 ///     let command = "| ffmpeg -loglevel error -i /dev/video0 -f yuv4mpegpipe -pix_fmt yuv420p -";
-///     let mut camera = LiveCamera::open(command, None)?;
+///     let mut camera = LiveCamera::open(command, None, &Arc::default())?;
 ///     let mut frame = GrayImage::default();
 ///     camera.grab(&mut frame)?;
 ///     assert_eq!(frame.dimensions(), camera.dimensions());
@@ -39,7 +42,11 @@ pub struct LiveCamera {
     name: String,
     size: (u32, u32),
     shared: Arc<Shared>,
+    stop: Arc<AtomicBool>,
 }
+
+/// Longest wait between two looks at the flag.
+const LOOK: Duration = Duration::from_millis(20);
 
 #[derive(Debug, Default)]
 struct Shared {
@@ -95,20 +102,32 @@ impl Shared {
 
 impl LiveCamera {
     /// Opens `source` and waits for its first frame: `-` for standard input, the path of a named
-    /// pipe or device, or `| COMMAND` for what a command of the shell writes. The frames of an
-    /// ordinary file, a recording, are delivered one by one.
+    /// pipe, or `| COMMAND` for what a command of the shell writes. The frames of an ordinary file,
+    /// a recording, are delivered one by one. The stream is Y4M, or 8-bit gray frames of the size
+    /// `raw` without any header.
     ///
-    /// The stream is Y4M, or 8-bit gray frames of the size `raw` without any header.
+    /// A path below `/dev/video` or `/dev/v4l/`, or any after `v4l2:`, is that of a camera of Linux
+    /// (feature `v4l2`), whose frames have the size `raw` or the one that it is set to.
     ///
     /// # Errors
     /// [`FrameError::Failed`] if the source cannot be opened, is no such stream, or delivers
     /// nothing within 10 s.
-    pub fn open(source: &str, raw: Option<(u32, u32)>) -> Result<Self, FrameError> {
+    pub fn open(
+        source: &str,
+        raw: Option<(u32, u32)>,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Self, FrameError> {
+        let device = source.strip_prefix("v4l2:");
+        let by_name = ["/dev/video", "/dev/v4l/"];
+        let by_name = by_name.iter().any(|start| source.starts_with(start));
+        if let Some(path) = device.or(by_name.then_some(source)) {
+            return Self::of_device(path, raw, stop);
+        }
         let (asked, in_order) = (
             source.to_owned(),
             fs::metadata(source).is_ok_and(|file| file.is_file()),
         );
-        Self::start(source, in_order, move || {
+        Self::start(source, in_order, stop, move || {
             let bytes = BufReader::new(opened(&asked).map_err(|error| error.to_string())?);
             match raw {
                 None => FrameStream::y4m(bytes).map_err(|error| match error {
@@ -122,20 +141,46 @@ impl LiveCamera {
         })
     }
 
+    #[cfg(feature = "v4l2")]
+    fn of_device(
+        path: &str,
+        size: Option<(u32, u32)>,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Self, FrameError> {
+        let device = hough_heuristic::VideoDevice::open(path, size)?;
+        Self::over(path, stop, move || Ok(device))
+    }
+
+    #[cfg(not(feature = "v4l2"))]
+    fn of_device(
+        path: &str,
+        _: Option<(u32, u32)>,
+        _: &Arc<AtomicBool>,
+    ) -> Result<Self, FrameError> {
+        let built = "this program was built without cameras by name (cargo's --features v4l2)";
+        let pipe = format!("'| ffmpeg -i {path} -f yuv4mpegpipe -pix_fmt yuv420p -' does the same");
+        Err(FrameError::Failed {
+            origin: format!("camera {path}"),
+            reason: format!("{built}; {pipe}"),
+        })
+    }
+
     /// Reads the frames of a camera of any kind. `open` is called in the thread that reads.
     ///
     /// # Errors
     /// [`FrameError::Failed`] with the reason of `open`, or if no frame comes within 10 s.
     pub fn over<S: FrameSource>(
         name: &str,
+        stop: &Arc<AtomicBool>,
         open: impl FnOnce() -> Result<S, String> + Send + 'static,
     ) -> Result<Self, FrameError> {
-        Self::start(name, false, open)
+        Self::start(name, false, stop, open)
     }
 
     fn start<S: FrameSource>(
         name: &str,
         in_order: bool,
+        stop: &Arc<AtomicBool>,
         open: impl FnOnce() -> Result<S, String> + Send + 'static,
     ) -> Result<Self, FrameError> {
         const FIRST: Duration = Duration::from_secs(10);
@@ -155,6 +200,7 @@ impl LiveCamera {
             name: name.into(),
             size: (0, 0),
             shared,
+            stop: Arc::clone(stop),
         };
         let size = camera.newest(None)?.frame.dimensions();
         camera.size = size;
@@ -183,6 +229,9 @@ impl LiveCamera {
             if let Some(reason) = &state.ended {
                 return Err(failed(reason.clone()));
             }
+            if self.stop.load(Ordering::Relaxed) {
+                return Err(failed("stopped on request".into()));
+            }
             let left = until.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 let seconds = self.patience.as_secs_f64();
@@ -190,7 +239,7 @@ impl LiveCamera {
                     "no frame for {seconds} s; check the camera and the program that feeds the pipe"
                 )));
             }
-            let woken = self.shared.changed.wait_timeout(state, left);
+            let woken = self.shared.changed.wait_timeout(state, left.min(LOOK));
             state = woken.unwrap_or_else(PoisonError::into_inner).0;
         }
     }

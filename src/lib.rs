@@ -18,6 +18,8 @@
 //! in which an agent goes for a ball.
 //!
 //! ```
+//! use std::ops::ControlFlow;
+//!
 //! use puma_grasp::Simulator;
 //! use puma_grasp::grasp_agent::BehaviourSpec;
 //! use puma_grasp::pipeline_sim::{Ball, Cell, MoveForm};
@@ -30,7 +32,8 @@
 //!     let (centering, approaching) = cell.sample_moves(500, 0.5, &mut rng)?;
 //!     let simulator = Simulator::fit(&centering, &approaching, MoveForm::Rigid22)?;
 //!     let spec = BehaviourSpec::centering();
-//!     let lesson = simulator.learn(spec, &[], 20_000, &mut rng, &mut |_| {})?;
+//!     let go_on = &mut |_: &_| ControlFlow::Continue(());
+//!     let lesson = simulator.learn(spec, &[], 20_000, &mut rng, go_on)?;
 //!     let last = lesson.curve.last();
 //!     assert!(last.and_then(|record| record.success_share) > Some(0.8));
 //!     Ok(())

@@ -1,8 +1,8 @@
 //! The rig: an arm behind a VAL II controller, with the simulated cell around it.
 
 use std::io;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use grasp_agent::{Agent, AgentError, CameraEye, Controller, RunEvent, RunOutcome};
@@ -26,6 +26,9 @@ use crate::detector::BallDetector;
 /// arm. [`Rig::on_port`] and [`Rig::on_socket`] connect to another controller. The cell then
 /// follows the pose that it reports at the end of each move, and its own sensors guard the moves.
 /// [`Rig::seen_by`] replaces the simulated cell by a real camera.
+///
+/// All three take a flag. Once it is set, the arm is stopped by the controller's own stop: the
+/// order under way, or the next one, ends with an error.
 pub struct Rig {
     name: String,
     arm: Box<dyn Manipulator>,
@@ -34,11 +37,7 @@ pub struct Rig {
     camera: CellCamera<Box<dyn FnMut() -> Joints + Send>>,
     /// A real camera, if there is one.
     real: Option<Box<dyn FrameSource + Send>>,
-    stop: StopFlag,
 }
-
-/// Flag of the rig's user, once there is one.
-type StopFlag = Arc<OnceLock<Arc<AtomicBool>>>;
 
 /// Reader of the current angles of the arm's links.
 type Pose = Arc<dyn Fn() -> Joints + Send + Sync>;
@@ -62,9 +61,13 @@ impl Rig {
     ///
     /// # Errors
     /// The system has no free line, or the emulator does not answer on it.
-    pub fn emulated(realtime: bool, scene: &Scene, seed: u64) -> Result<Self, RigError> {
+    pub fn emulated(
+        realtime: bool,
+        scene: &Scene,
+        seed: u64,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Self, RigError> {
         let (cell, client_config) = (paper_cell(), ClientConfig::for_emulator());
-        let stop = StopFlag::default();
         let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
         let around = cell.clone();
         emulator
@@ -95,13 +98,12 @@ impl Rig {
             Arc::new(move || linked.links(&server.with_emulator(|emulator| emulator.joints())));
         let arm = {
             let pose = Arc::clone(&pose);
-            cell.with_jaws_of(
-                connect(line, client_config, FULL_SPEED, &stop)?,
-                move || pose(),
-            )
+            cell.with_jaws_of(connect(line, client_config, FULL_SPEED, stop)?, move || {
+                pose()
+            })
         };
         let arm = Box::new(arm);
-        Ok(Self::assemble(name, (arm, stop), pose, cell, (scene, seed)))
+        Ok(Self::assemble(name, arm, pose, cell, (scene, seed)))
     }
 
     /// Connects to the controller on the serial device `path`, sets its monitor speed to `speed`
@@ -110,8 +112,14 @@ impl Rig {
     /// # Errors
     /// No such device, a busy one, or no VAL II monitor at its other end.
     #[cfg(feature = "serial")]
-    pub fn on_port(path: &str, speed: f64, scene: &Scene, seed: u64) -> Result<Self, RigError> {
-        Self::elsewhere(SerialLine::open(path, BAUD)?, speed, scene, seed)
+    pub fn on_port(
+        path: &str,
+        speed: f64,
+        scene: &Scene,
+        seed: u64,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Self, RigError> {
+        Self::elsewhere(SerialLine::open(path, BAUD)?, speed, (scene, seed), stop)
     }
 
     /// Connects to the controller behind the socket `address` (`host:port`), in the same way.
@@ -123,9 +131,10 @@ impl Rig {
         speed: f64,
         scene: &Scene,
         seed: u64,
+        stop: &Arc<AtomicBool>,
     ) -> Result<Self, RigError> {
         let line = TcpLine::connect(address, SOCKET_TIMEOUT)?;
-        Self::elsewhere(line, speed, scene, seed)
+        Self::elsewhere(line, speed, (scene, seed), stop)
     }
 
     /// Replaces the simulated cell by what a real camera on the hand sees. The rendered ball is
@@ -145,21 +154,20 @@ impl Rig {
     fn elsewhere<T: Transport + 'static>(
         line: T,
         speed: f64,
-        scene: &Scene,
-        seed: u64,
+        rendered: (&Scene, u64),
+        stop: &Arc<AtomicBool>,
     ) -> Result<Self, RigError> {
         let name = line.name().to_owned();
-        let stop = StopFlag::default();
-        let mut arm = connect(line, ClientConfig::default(), speed, &stop)?;
+        let mut arm = connect(line, ClientConfig::default(), speed, stop)?;
         let (cell, start) = (paper_cell(), arm.joints()?);
         let (arm, pose) = cell.follow(arm, start);
         let (arm, pose): (_, Pose) = (Box::new(arm), Arc::new(pose));
-        Ok(Self::assemble(name, (arm, stop), pose, cell, (scene, seed)))
+        Ok(Self::assemble(name, arm, pose, cell, rendered))
     }
 
     fn assemble(
         name: String,
-        (arm, stop): (Box<dyn Manipulator>, StopFlag),
+        arm: Box<dyn Manipulator>,
         pose: Pose,
         cell: SharedCell,
         (scene, seed): (&Scene, u64),
@@ -176,14 +184,7 @@ impl Rig {
             cell,
             camera,
             real: None,
-            stop,
         }
-    }
-
-    /// Stops the arm by the controller's own stop once `flag` is set: the order under way, or the
-    /// next one, ends with an error. Only the first flag that is given counts.
-    pub fn stopped_by(&self, flag: Arc<AtomicBool>) {
-        let _ = self.stop.set(flag);
     }
 
     /// Returns the name of the line to the controller: a device path or an address.
@@ -333,7 +334,7 @@ fn paper_cell() -> SharedCell {
 #[derive(Debug)]
 struct StoppableLine<T> {
     inner: T,
-    stop: StopFlag,
+    stop: Arc<AtomicBool>,
     /// Set when the line has failed for the flag.
     told: bool,
 }
@@ -349,8 +350,7 @@ impl<T: Transport> Transport for StoppableLine<T> {
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<usize>> {
         let until = self.inner.clock().saturating_add(timeout);
         loop {
-            let flag = self.stop.get();
-            let stop = flag.is_some_and(|flag| flag.load(Ordering::Relaxed));
+            let stop = self.stop.load(Ordering::Relaxed);
             if stop && !std::mem::replace(&mut self.told, true) {
                 return Err(io::Error::other("stopped on request"));
             }
@@ -376,7 +376,7 @@ fn connect<T: Transport>(
     line: T,
     config: ClientConfig,
     speed: f64,
-    stop: &StopFlag,
+    stop: &Arc<AtomicBool>,
 ) -> Result<GuardedArm<StoppableLine<T>>, ArmError> {
     let config = ClientConfig {
         speed_percent: Some(speed),
@@ -389,7 +389,11 @@ fn connect<T: Transport>(
         told: false,
     };
     let mut client = Val2Client::connect(line, config)?;
-    client.calibrate()?;
+    if let Err(error) = client.calibrate() {
+        // The joints may be turning.
+        let _ = client.stop();
+        return Err(error);
+    }
     GuardedArm::new(client)
 }
 

@@ -1,5 +1,7 @@
 //! Samples of moves made by an arm: the paper's own way to its simulator.
 
+use std::ops::ControlFlow;
+
 use grasp_agent::{AgentError, Eye, Sighting};
 use hough_heuristic::{Features, FrameError};
 use pipeline_sim::{Ball, Cell, MoveSample, Workspace};
@@ -27,8 +29,8 @@ impl Simulator {
     /// which the ball should be seen, and keeps what the camera shows before and after the move.
     /// `nominal` plans them: an approximate cell, whose ball is put where the arm sees one, and
     /// which keeps the hand away from it. Poses and moves that lose the ball are tried again
-    /// elsewhere. `on_progress` is called with the number of samples so far, and ends the sampling
-    /// by `false`.
+    /// elsewhere. `on_progress` is called with each sample; its [`ControlFlow::Break`] ends the
+    /// sampling.
     ///
     /// # Errors
     /// Faults of camera and arm; [`FrameError::Failed`] if no ball is in view, or lost again and
@@ -39,7 +41,7 @@ impl Simulator {
         nominal: &Cell,
         count: usize,
         rng: &mut R,
-        on_progress: &mut dyn FnMut(usize) -> bool,
+        on_progress: &mut dyn FnMut(&MoveSample) -> ControlFlow<()>,
     ) -> Result<(Vec<MoveSample>, Vec<MoveSample>), AgentError> {
         arm.set_gripper(Gripper::Open)?;
         let mut sampler = Sampler {
@@ -60,12 +62,13 @@ impl Simulator {
                 }
                 continue;
             };
+            let flow = on_progress(&sample);
             if turn_waist {
                 centering.push(sample);
             } else {
                 reaching.push(sample);
             }
-            if !on_progress(centering.len() + reaching.len()) {
+            if flow.is_break() {
                 break;
             }
         }

@@ -1,5 +1,7 @@
 //! The simulator in which both behaviours are learned, as in section 4 of the paper.
 
+use std::ops::ControlFlow;
+
 use grasp_agent::{BehaviourError, BehaviourSpec, JointLimits, LearningSettings, Lesson, Percept};
 use pipeline_sim::{MoveForm, MoveModel, MoveSample, Quality, QuantityError};
 use puma_val2::{Joint, JointDelta};
@@ -85,6 +87,7 @@ impl Simulator {
     ///
     /// `trials` are percepts from which tables are tried. With them, the best table of the second
     /// half of the run is kept ([`BehaviourSpec::learn`]); if `trials` is empty, the last table.
+    /// A [`ControlFlow::Break`] of `on_progress` ends the learning.
     ///
     /// # Errors
     /// No actions to learn from, or a reward that is not a number (the literal Eq. 5 and 6 divide
@@ -95,7 +98,7 @@ impl Simulator {
         trials: &[Percept],
         actions: u64,
         rng: &mut dyn Rng,
-        on_progress: &mut dyn FnMut(&Record),
+        on_progress: &mut dyn FnMut(&Record) -> ControlFlow<()>,
     ) -> Result<Lesson, BehaviourError> {
         let simulate = |percept: &Percept, delta: &JointDelta| self.predict(percept, delta);
         let start = |rng: &mut dyn Rng| self.start(rng);

@@ -141,9 +141,10 @@ fn run(options: &Options) -> Outcome {
     }
     say!("{}", Row::HEADER);
     let bar = progress_bar(count as u64, "cells", false);
+    let mut done = Ok(());
     for (level, draws) in &levels {
         let mut cells = Vec::new();
-        let done = on_threads(options.threads, draws.len(), &mut cells, |index| {
+        done = on_threads(options.threads, draws.len(), &mut cells, |index| {
             let draw = draws[index];
             let cell = match sweep.finished(*level, draw)? {
                 Some(cell) => cell,
@@ -168,12 +169,14 @@ fn run(options: &Options) -> Outcome {
             });
         }
         // The rows of a level that was broken off are of the cells until then.
-        done?;
+        if done.is_err() {
+            break;
+        }
     }
     bar.finish_and_clear();
-    tables.plot()?;
+    let plotted = tables.plot();
     say!("results: {}", options.out.display());
-    Ok(())
+    done.and(plotted)
 }
 
 /// Makes one result of those in several folders.

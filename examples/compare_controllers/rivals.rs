@@ -9,7 +9,7 @@ use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use example_support::learning::{
-    ACTIONS, ACTIONS_FINE, TRIALS, anywhere, paper_cell, quiet, simulators,
+    ACTIONS, ACTIONS_FINE, TRIALS, anywhere, learned_whole, paper_cell, simulators, until_stopped,
 };
 use example_support::plane::{ExactPlane, search_percepts};
 use example_support::prelude::*;
@@ -100,16 +100,17 @@ fn learned(options: &Options) -> Outcome<Vec<(&'static str, Learned)>> {
     let found = search_percepts(TRIALS, seed_of(options.seed, &[4]));
     let centering = BehaviourSpec::centering();
     let centering = rigid
-        .learn(centering, &starts, ACTIONS.0, rng, &mut quiet)?
+        .learn(centering, &starts, ACTIONS.0, rng, &mut until_stopped)?
         .behaviour;
     let (paper, fine) = (BehaviourSpec::approaching, BehaviourSpec::approaching_fine);
     let approaching = [
-        linear.learn(paper(), &found, ACTIONS.1, rng, &mut quiet)?,
-        rigid.learn(paper(), &found, ACTIONS.1, rng, &mut quiet)?,
-        rigid.learn(fine(), &found, ACTIONS_FINE, rng, &mut quiet)?,
-        plane.learn(paper(), &found, ACTIONS.1, rng, &mut quiet)?,
-        plane.learn(fine(), &found, ACTIONS_FINE, rng, &mut quiet)?,
+        linear.learn(paper(), &found, ACTIONS.1, rng, &mut until_stopped)?,
+        rigid.learn(paper(), &found, ACTIONS.1, rng, &mut until_stopped)?,
+        rigid.learn(fine(), &found, ACTIONS_FINE, rng, &mut until_stopped)?,
+        plane.learn(paper(), &found, ACTIONS.1, rng, &mut until_stopped)?,
+        plane.learn(fine(), &found, ACTIONS_FINE, rng, &mut until_stopped)?,
     ];
+    learned_whole()?;
     let both = approaching.map(|lesson| Learned::new(centering.clone(), lesson.behaviour));
     Ok(NAMES.into_iter().zip(both).collect())
 }

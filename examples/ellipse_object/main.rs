@@ -79,8 +79,7 @@ fn run(options: &Options) -> Outcome {
     let _lock = lock_folder(&options.out)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
     let scene = Scene::bright_ball();
-    let mut rig = Rig::emulated(false, &scene, options.seed)?;
-    rig.stopped_by(STOP.clone());
+    let mut rig = Rig::emulated(false, &scene, options.seed, &STOP)?;
     let mut features = Watched {
         features: egg_features(options.seed)?,
         outline: Rc::default(),
@@ -95,11 +94,16 @@ fn run(options: &Options) -> Outcome {
     let agent = Agent::with_controller(config, learned)?;
 
     let run_file = |run: usize| options.out.join(format!("egg{run:03}.json"));
-    let (mut gripped, mut moves) = (0, 0);
+    let (mut made, mut gripped, mut moves) = (0, 0, 0);
+    // The results until a fault are kept.
+    let mut done = Ok(());
     say!(" run  moves  lost  final x, y, shorter half-axis   miss (mm)  off across (deg)  result");
     let bar = progress_bar(options.runs as u64, "eggs", false);
     for run in 1..=options.runs {
-        go_on()?;
+        done = go_on();
+        if done.is_err() {
+            break;
+        }
         let place = ball_in_view(rig.cell(), &mut rng)?;
         let egg = Egg {
             half_length: 0.5e-3 * options.length,
@@ -149,9 +153,11 @@ fn run(options: &Options) -> Outcome {
             Ok(outcome) => outcome,
             Err(error) => {
                 let kept = keep_run(&run_file(run), &saved)?;
-                return Err(format!("run {run} was broken off: {error}; {kept}").into());
+                done = Err(format!("run {run} was broken off: {error}; {kept}").into());
+                break;
             }
         };
+        made += 1;
         let round = options.length < 44.0;
         let across = closed.is_some_and(|(_, off)| round || off <= ACROSS_TOLERANCE);
         let held = outcome.gave_up.is_none() && rig.holds_ball() && across;
@@ -186,18 +192,19 @@ fn run(options: &Options) -> Outcome {
                 (ellipse.x + cos * u - sin * v, ellipse.y + sin * u + cos * v)
             });
             let picture = options.out.join(format!("egg{run:03}.png"));
-            write_png(&picture, &overlay.into_image())?;
+            let seen = seen.trim();
+            let words = format!("egg {run} move {cycles}  x, y, shorter half-axis: {seen}");
+            write_png(&picture, &overlay.captioned(&words))?;
         }
     }
     bar.finish_and_clear();
     say!(
-        "\n{gripped} of {} gripped ({:.1} %), {:.1} moves on average; pictures: {}",
-        options.runs,
-        100.0 * gripped as f64 / options.runs as f64,
+        "\n{gripped} of {made} gripped ({:.1} %), {:.1} moves on average; pictures: {}",
+        100.0 * gripped as f64 / made.max(1) as f64,
         moves as f64 / gripped.max(1) as f64,
         options.out.display()
     );
-    Ok(())
+    done
 }
 
 /// Builds a detector of ellipses among the edges of the frame.

@@ -11,6 +11,7 @@ use std::fs::File;
 use std::io::{self, BufRead, BufWriter, ErrorKind, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -18,6 +19,7 @@ use clap::Parser;
 use example_support::learning::paper_cell;
 use example_support::prelude::*;
 use example_support::program::stopped;
+use example_support::real::size;
 use example_support::trial::ball_in_view;
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{FrameSource, Y4mWriter};
@@ -48,6 +50,9 @@ struct Options {
     /// Frames per second
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = rate)]
     fps: u32,
+    /// Size of the frames
+    #[arg(long, value_name = "WxH", default_value = "768x576", value_parser = size)]
+    size: (u32, u32),
     /// Let the arm move at the speed of a real one, otherwise in no time
     #[arg(long)]
     realtime: bool,
@@ -69,6 +74,9 @@ fn rate(text: &str) -> Result<u32, String> {
     }
 }
 
+/// Flag that the order `quit` sets.
+static QUIT: AtomicBool = AtomicBool::new(false);
+
 fn main() -> ExitCode {
     start(run)
 }
@@ -78,6 +86,7 @@ fn run(options: &Options) -> Outcome {
     let errors = options.level.draw(&mut rng);
     let mut cell = errors.apply(&paper_cell())?;
     cell.ball.radius = options.ball_radius / 1000.0;
+    cell.camera = cell.camera.resized(options.size.0, options.size.1)?;
     let cell = SharedCell::new(cell);
     cell.set_errors(&errors)?;
     let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
@@ -102,7 +111,7 @@ fn run(options: &Options) -> Outcome {
     let mut next_place = Xoshiro256PlusPlus::seed_from_u64(options.seed ^ 1);
     let (period, mut due) = (Duration::from_secs(1) / options.fps, Instant::now());
     let mut video = None;
-    while !stopped() {
+    while !stopped() && !QUIT.load(Ordering::Relaxed) {
         let asked = server.with_emulator(|emulator| emulator.gripper());
         if asked != jaws {
             let let_go = asked == Gripper::Open && cell.get().held.is_some();
@@ -129,7 +138,7 @@ fn run(options: &Options) -> Outcome {
         due = (due + period).max(Instant::now());
         thread::sleep(due.saturating_duration_since(Instant::now()));
     }
-    Ok(())
+    go_on()
 }
 
 /// Opens the output of the frames; `None` for a named pipe that nobody reads.
@@ -205,7 +214,7 @@ fn attend(server: &EmulatorServer, cell: &SharedCell, rng: &mut Xoshiro256PlusPl
             }
             "jaws" => cell.with(|cell| cell.place_ball(cell.tool_point(&links))),
             "away" => cell.remove_ball(),
-            "quit" => return STOP.store(true, std::sync::atomic::Ordering::Relaxed),
+            "quit" => return QUIT.store(true, Ordering::Relaxed),
             "" => continue,
             other => {
                 notice(&format!("{other}: unknown; ball, jaws, away or quit"));

@@ -21,7 +21,7 @@ use example_support::trial::{ball_in_view, run_on_rig};
 use options::Options;
 use record::{Picture, RunRecord};
 use results::{ContactSheet, Summary, TrainingSummary};
-use taught::{ControllerName, Mind, Taught, behaviours, export, goal, hybrid, save};
+use taught::{ControllerName, Mind, Taught, Training, behaviours, export, goal, hybrid, save};
 
 mod options;
 mod plots;
@@ -67,26 +67,34 @@ fn run(options: &Options) -> Outcome {
     let begin = Instant::now();
     let seeing = &mut (&mut rig, &mut *detector as _);
     let goal = goal(options, seeing)?;
-    let taught = match options.controller {
-        ControllerName::Hybrid => None,
-        ControllerName::Learned => Some(match loaded {
-            Some(taught) => taught,
-            None => Taught::train(options, &live, &pair, goal.as_ref(), seeing, &mut rng)?,
-        }),
+    let (goal_shown, mut training) = (goal.as_ref(), Training::default());
+    let taught = match (options.controller, loaded) {
+        (ControllerName::Hybrid, _) => Ok(None),
+        (ControllerName::Learned, Some(taught)) => Ok(Some(taught)),
+        (ControllerName::Learned, None) => {
+            let training = &mut training;
+            Taught::train(
+                options, &live, &pair, goal_shown, seeing, training, &mut rng,
+            )
+            .map(Some)
+        }
     };
-    let lessons = taught.as_ref().map_or(&[][..], |taught| &taught.lessons);
+    let Training { lessons, r2 } = training;
     let lasts = lessons.iter().filter_map(|lesson| lesson.curve.last());
     let training = TrainingSummary {
         trained: !lessons.is_empty(),
         actions: lasts.map(|record| record.actions).sum(),
         seconds: begin.elapsed().as_secs_f64(),
-        r2: taught
-            .as_ref()
-            .map_or_else(Default::default, |taught| taught.r2.clone()),
+        r2,
     };
     if training.trained {
-        plots::learning_curves(&out("learning.svg"), lessons)?;
+        plots::learning_curves(&out("learning.svg"), &lessons)?;
     }
+    if taught.is_err() {
+        // The figures of the training until the fault are kept.
+        Summary::new(options.seed, &training, &[], &[]).write(&out("summary.json"))?;
+    }
+    let taught = taught?;
 
     let mut config = AgentConfig {
         goal: pair.goal(),
@@ -94,9 +102,7 @@ fn run(options: &Options) -> Outcome {
     };
     let mind = match taught {
         None => Mind::Hybrid(Box::new(hybrid(options, goal.as_ref())?)),
-        Some(Taught {
-            learned, limits, ..
-        }) => {
+        Some(Taught { learned, limits }) => {
             export(options, &learned, &limits)?;
             config.limits = limits;
             let shown = goal.iter().fold(learned, Learned::shown);
@@ -126,6 +132,7 @@ fn run(options: &Options) -> Outcome {
             let settings = OnlineLearning::careful(options.seed.wrapping_add(run as u64));
             **learned = learned.clone().learning(settings)?;
         }
+        live.goal(&agent.config().goal);
         let simulated = rig.is_simulated();
         let ball_mm = simulated.then(|| (ball.centre.coords * 1000.0).into());
         let mut record = RunRecord::new(run, ball_mm, SavedRun::before(&agent));
@@ -193,7 +200,7 @@ fn run(options: &Options) -> Outcome {
         }
     }
     bar.finish_and_clear();
-    let limits = agent.config().limits;
+    let (limits, shown) = (agent.config().limits, agent.config().goal.clone());
     match agent.into_controller().inner {
         // Includes what was learned in a run that was broken off.
         Mind::Learned(learned) if options.keep_learning => {
@@ -204,18 +211,19 @@ fn run(options: &Options) -> Outcome {
         Mind::Hybrid(hybrid) => hybrid.belief().save(&out("camera.belief"))?,
     }
 
-    let summary = Summary::new(options.seed, &training, &records);
+    let summary = Summary::new(options.seed, &training, &records, &shown);
     // The first fault is the one that is reported; the smallest files come first.
     let mut keep = |written: Outcome| {
         if let Err(error) = written {
             broken_off.get_or_insert(error.to_string());
         }
     };
-    keep(write_whole(
-        &out("summary.json"),
-        &serde_json::to_vec_pretty(&summary)?,
+    keep(summary.write(&out("summary.json")));
+    keep(plots::features_per_step(
+        &out("features.svg"),
+        &records,
+        &shown,
     ));
-    keep(plots::features_per_step(&out("features.svg"), &records));
     keep(write_png(&out("contact_sheet.png"), &sheet.drawn()));
     let end = broken_off
         .as_deref()

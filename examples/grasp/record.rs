@@ -56,6 +56,8 @@ pub(crate) struct Picture {
     pub(crate) step: usize,
     /// Set if the ball was found, or the jaws are closed.
     pub(crate) shown: bool,
+    /// Set if the jaws are closed.
+    pub(crate) gripped: bool,
     pub(crate) image: RgbImage,
     pub(crate) words: String,
 }
@@ -117,7 +119,10 @@ impl RunRecord {
         let frame = event.frame?;
         self.frames += 1;
         let mut overlay = Overlay::new(frame);
-        let mut found = "no ball".into();
+        let mut found = match self.gripped {
+            true => "jaws closed".into(),
+            false => "no ball".into(),
+        };
         if let Some(f) = features {
             overlay.circle(&f.to_circle(frame.width()));
             found = format!("x {:.1} y {:.1} r {:.1}", f.x, f.y, f.r);
@@ -128,6 +133,7 @@ impl RunRecord {
             number: self.frames,
             step: event.cycle,
             shown: features.is_some() || self.gripped,
+            gripped: self.gripped,
             image: resize(&overlay.into_image(), width, height, FilterType::Triangle),
             words: format!("run {} move {}  {found}", self.run, event.cycle),
         })

@@ -2,14 +2,17 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::path::Path;
 
+use grasp_agent::GoalInterval;
 use image::imageops::{FilterType, replace, resize};
 use image::{Rgb, RgbImage};
 use serde::Serialize;
 
 use crate::record::{Picture, RunRecord, RunSummary};
 use example_support::overlay::Overlay;
-use example_support::trial::{FEATURES, Feature};
+use example_support::prelude::*;
+use example_support::trial::{FEATURES, goal_of};
 
 /// Content of `summary.json`.
 #[derive(Serialize)]
@@ -19,6 +22,9 @@ pub(crate) struct Summary<'a> {
     pub(crate) runs: Vec<&'a RunSummary>,
     pub(crate) success_rate: f64,
     pub(crate) mean_cycles: Option<f64>,
+    /// Goal interval of x, y and r.
+    #[serde(skip)]
+    goal: [(f64, f64); 3],
 }
 
 #[derive(Serialize)]
@@ -32,7 +38,12 @@ pub(crate) struct TrainingSummary {
 }
 
 impl<'a> Summary<'a> {
-    pub(crate) fn new(seed: u64, training: &'a TrainingSummary, records: &'a [RunRecord]) -> Self {
+    pub(crate) fn new(
+        seed: u64,
+        training: &'a TrainingSummary,
+        records: &'a [RunRecord],
+        goal: &[GoalInterval],
+    ) -> Self {
         let runs: Vec<&RunSummary> = records.iter().map(|record| &record.summary).collect();
         let counted = runs.iter().filter(|run| !run.broken_off).count();
         let grasped = || runs.iter().filter(|run| run.grasped);
@@ -46,7 +57,21 @@ impl<'a> Summary<'a> {
             success_rate: count as f64 / counted.max(1) as f64,
             mean_cycles: (count > 0).then(|| cycles as f64 / count as f64),
             runs,
+            goal: goal_of(goal),
         }
+    }
+
+    /// Writes the file.
+    pub(crate) fn write(&self, path: &Path) -> Outcome {
+        write_whole(path, &serde_json::to_vec_pretty(self)?)
+    }
+
+    fn goal_words(&self) -> String {
+        let short = |value: f64| format!("{value:.1}").trim_end_matches(".0").to_owned();
+        let features = FEATURES.iter().zip(self.goal);
+        let words = features
+            .map(|((name, ..), (low, high))| format!("{name} {}..{}", short(low), short(high)));
+        words.collect::<Vec<_>>().join(", ")
     }
 
     /// Returns the result of all runs in a line.
@@ -95,15 +120,10 @@ impl fmt::Display for Summary<'_> {
             f,
             "\nx, y, r: the last sighting, feature units; goal {}; miss: from the ball's centre to \
              the gripper when it closed",
-            goal_words()
+            self.goal_words()
         )?;
         write!(f, "\n\n{}", self.in_words())
     }
-}
-
-fn goal_words() -> String {
-    let goal = |(name, (low, high), ..): Feature| format!("{name} {low}..{high}");
-    FEATURES.map(goal).join(", ")
 }
 
 /// Contact sheet that fits a screen: a row of views for each of the first runs, the last one with
@@ -128,7 +148,11 @@ impl ContactSheet {
         self.0.resize_with(picture.run, Vec::new);
         let small = resize(&picture.image, SMALL.0, SMALL.1, FilterType::Triangle);
         let mut view = Overlay::from(small);
-        view.label(&format!("run {} move {}", picture.run, picture.step));
+        let words = match picture.gripped {
+            true => "jaws closed".into(),
+            false => format!("move {}", picture.step),
+        };
+        view.label(&format!("run {} {words}", picture.run));
         self.0[picture.run - 1].push(view.into_image());
     }
 

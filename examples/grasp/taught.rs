@@ -1,6 +1,8 @@
 //! Knowledge of the controllers: goals shown on the arm, policies and beliefs, learned or read.
 
 use std::collections::BTreeMap;
+use std::fs;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
@@ -16,8 +18,9 @@ use puma_val2::Joints;
 use rand::Rng;
 use rand::rngs::Xoshiro256PlusPlus;
 
+use example_support::files::writable_folder;
 use example_support::learning::{
-    ACTIONS, ACTIONS_FINE, FEATURE_NOISE, SAMPLES, TRIALS, anywhere, paper_cell,
+    ACTIONS, ACTIONS_FINE, FEATURE_NOISE, SAMPLES, TRIALS, anywhere, paper_cell, until_stopped,
 };
 use example_support::live::Live;
 use example_support::plane::search_percepts;
@@ -163,12 +166,26 @@ fn samples(
     let bar = progress_bar(2 * count as u64, "moves", options.quiet);
     let RigParts { camera, arm, .. } = rig.parts();
     let mut eye = CameraEye::new(camera, &mut **detector);
-    let mut taken = Simulator::sample_on_arm(&mut eye, arm, &cell, count, rng, &mut |done| {
-        bar.set_position(done as u64);
-        !stopped()
-    })?;
+    let path = options.out.join("samples.csv");
+    let columns = "x,y,r,jt3,d1,d2,d3,x_after,y_after,r_after";
+    let (mut table, mut written) = (Table::create(path.clone(), columns)?, Ok(()));
+    let taken = Simulator::sample_on_arm(&mut eye, arm, &cell, count, rng, &mut |sample| {
+        bar.inc(1);
+        written = table.row(row_of(sample));
+        match written.is_err() || stopped() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    });
     bar.finish_and_clear();
-    go_on()?;
+    written?;
+    if stopped() {
+        let (count, path) = (bar.position(), path.display());
+        return Err(
+            format!("stopped by a signal; the {count} samples so far are in {path}").into(),
+        );
+    }
+    let mut taken = taken?;
     // The behaviours are learned at the paper's goal, to which those of the ball are moved.
     let there = |features| {
         let seen = Sighting::new(features);
@@ -180,13 +197,57 @@ fn samples(
     Ok(taken)
 }
 
-/// Learned behaviours and their origin.
+fn row_of(sample: &MoveSample) -> String {
+    let (f, after) = (sample.before, sample.after);
+    let [d1, d2, d3] = sample.turns;
+    format!(
+        "{:.2},{:.2},{:.2},{:.3},{d1:.3},{d2:.3},{d3:.3},{:.2},{:.2},{:.2}",
+        f.x, f.y, f.r, sample.jt3_degrees, after.x, after.y, after.r
+    )
+}
+
+/// Learned behaviours.
 pub(crate) struct Taught {
     pub(crate) learned: Learned,
     pub(crate) limits: JointLimits,
-    /// Centering and approaching as they were learned; none if they were read from files.
+}
+
+/// The training so far; empty if the behaviours were read from files.
+#[derive(Default)]
+pub(crate) struct Training {
+    /// Centering and approaching as they were learned.
     pub(crate) lessons: Vec<Lesson>,
+    /// Fit of each output of the simulator.
     pub(crate) r2: BTreeMap<String, f64>,
+}
+
+impl Training {
+    /// Adds a lesson. If a signal has ended it, saves all that was learned to a folder of its own.
+    ///
+    /// # Errors
+    /// A signal.
+    fn add(&mut self, options: &Options, lesson: Lesson, planned: u64) -> Outcome {
+        let (name, made) = (
+            lesson.behaviour.spec().name.clone(),
+            lesson.curve.last().map_or(0, |record| record.actions),
+        );
+        self.lessons.push(lesson);
+        if !stopped() {
+            return Ok(());
+        }
+        let folder = options.out.join("unfinished");
+        writable_folder(&folder)?;
+        for lesson in &self.lessons {
+            let path = policy_path(&folder, lesson.behaviour.spec());
+            lesson.behaviour.save(&path)?;
+        }
+        let folder = folder.display();
+        Err(format!(
+            "stopped by a signal after {made} of {planned} actions of {name}; what was learned is \
+             in {folder}"
+        )
+        .into())
+    }
 }
 
 impl Taught {
@@ -197,8 +258,12 @@ impl Taught {
         pair: &BehaviourPair,
         goal: Option<&TaughtGoal>,
         seeing: &mut Seeing<'_>,
+        training: &mut Training,
         rng: &mut Xoshiro256PlusPlus,
     ) -> Outcome<Self> {
+        for spec in [&pair.centering, &pair.approaching] {
+            let _ = fs::remove_file(policy_path(&options.out.join("unfinished"), spec));
+        }
         let (centering, reaching) = samples(options, goal, seeing, rng)?;
         let fitted = Simulator::fit(&centering, &reaching, options.form());
         let mut simulator = fitted.map_err(|error| match options.sample {
@@ -209,13 +274,12 @@ impl Taught {
             let (_, anywhere) = paper_cell().sample_moves(SAMPLES, FEATURE_NOISE, rng)?;
             simulator = simulator.starting_from(&anywhere);
         }
-        let mut r2 = BTreeMap::new();
         for quality in simulator.quality() {
             let (output, fit, rmse) = (quality.output, quality.r2, quality.rmse);
             options.say(format_args!(
                 "  {output:<16} R² {fit:.4}   rmse {rmse:.2} units"
             ));
-            r2.insert(output, fit);
+            training.r2.insert(output, fit);
         }
         // With the literal rewards the last table is kept.
         let trials = match options.reward() {
@@ -227,6 +291,7 @@ impl Taught {
             teach((options, live), spec, &simulator, trials, actions, rng)
         };
         let first = teach(&pair.centering, &starts, ACTIONS.0)?;
+        training.add(options, first, ACTIONS.0)?;
         let found = search_percepts(trials, options.seed);
         let actions = if options.fine {
             ACTIONS_FINE
@@ -234,27 +299,22 @@ impl Taught {
             ACTIONS.1
         };
         let second = teach(&pair.approaching, &found, actions)?;
+        training.add(options, second, actions)?;
 
         // Uses the policies as saved.
-        save(
-            options,
-            &Learned::new(first.behaviour.clone(), second.behaviour.clone()),
-        )?;
-        let saved = Self::load(&options.out, pair)?;
+        for lesson in &training.lessons {
+            let path = policy_path(&options.out, lesson.behaviour.spec());
+            lesson.behaviour.save(&path)?;
+        }
         options.say(format_args!("policies saved to {}", options.out.display()));
-        let lessons = vec![first, second];
-        Ok(Self {
-            lessons,
-            r2,
-            ..saved
-        })
+        Self::load(&options.out, pair)
     }
 
     /// Reads saved policies: a folder with two of them, or an exported file.
     pub(crate) fn load(path: &Path, pair: &BehaviourPair) -> Outcome<Self> {
         let (learned, limits) = if path.is_file() {
             let name = path.display();
-            let text = std::fs::read_to_string(path)
+            let text = fs::read_to_string(path)
                 .map_err(|error| format!("{name}: cannot be read: {error}"))?;
             let (learned, limits) =
                 Learned::from_json(&text).map_err(|error| format!("{name}: {error}"))?;
@@ -270,12 +330,7 @@ impl Taught {
                 .map(|spec| Behaviour::load(&policy_path(path, spec), spec));
             (Learned::new(centering?, approaching?), JointLimits::paper())
         };
-        Ok(Self {
-            learned,
-            limits,
-            lessons: Vec::new(),
-            r2: BTreeMap::new(),
-        })
+        Ok(Self { learned, limits })
     }
 }
 
@@ -327,6 +382,7 @@ fn teach(
     let lesson = simulator.learn(spec.clone(), trials, actions, rng, &mut |progress| {
         bar.set_position(progress.actions);
         live.curve(&spec.name, progress);
+        until_stopped(progress)
     })?;
     bar.finish_and_clear();
     let success = lesson.curve.last().and_then(|record| record.success_share);

@@ -21,7 +21,7 @@ use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use example_support::learning::{
-    ACTIONS, ACTIONS_FINE, TRIALS, anywhere, paper_cell, quiet, simulators,
+    ACTIONS, ACTIONS_FINE, TRIALS, anywhere, paper_cell, simulators, until_stopped,
 };
 use example_support::plane::{ExactPlane, PlaneStart, score, search_percepts, search_starts};
 use example_support::plot::{CURVES, Panel, write_svg};
@@ -83,6 +83,7 @@ fn run(options: &Options) -> Outcome {
 /// the search poses.
 fn figure_6(options: &Options) -> Outcome<Learned> {
     let starts = search_starts(options.starts, options.first_seed.wrapping_add(1));
+    go_on()?;
     let optimum = starts.iter().map(|start| start.optimum).sum::<usize>();
     say!(
         "Figure 6: approaching, learned with each simulator and reward, then tried in the exact \
@@ -98,8 +99,16 @@ fn figure_6(options: &Options) -> Outcome<Learned> {
     let mut curves = [("centering", Vec::new()), ("approaching", Vec::new())];
     let mut taught = None;
     let bar = progress_bar(8 * options.seeds as u64, "tables learned", false);
+    // The seeds until a fault are drawn.
+    let mut done = Ok(());
     for seed in (options.first_seed..).take(options.seeds) {
-        let (centering, approaching) = learned_with(options, seed, &starts, &bar)?;
+        let (centering, approaching) = match learned_with(options, seed, &starts, &bar) {
+            Ok(lessons) => lessons,
+            Err(error) => {
+                done = Err(error);
+                break;
+            }
+        };
         for (name, curve) in [
             ("centering", &centering.curve),
             ("approaching", &approaching.curve),
@@ -123,6 +132,7 @@ fn figure_6(options: &Options) -> Outcome<Learned> {
         .flat_map(|(name, seeds)| CURVES.map(|curve| Panel::of_learning(name, curve, seeds)));
     let panels: Vec<Panel> = panels.collect();
     write_svg(&options.out.join("figure6.svg"), &panels, 2, SIZE)?;
+    done?;
     taught.ok_or_else(|| "at least one seed is needed".into())
 }
 
@@ -151,30 +161,32 @@ fn learned_with(
     let mut floored = literal.clone();
     floored.reward.floor = 1.0;
     let trials = anywhere(&rigid, TRIALS, rng);
-    let centering = rigid.learn(centering, &trials, ACTIONS.0, rng, &mut quiet)?;
+    let centering = rigid.learn(centering, &trials, ACTIONS.0, rng, &mut until_stopped)?;
     let found = search_percepts(1_000, seed.wrapping_add(1_000_000));
     // A table of more states has more corners in which a ball can be lost.
     let more = options.fine.min(10_000) as usize;
     let more_found = search_percepts(more, seed.wrapping_add(1_000_000));
-    let mut learn = |name, simulator: Option<&Simulator>, spec: &BehaviourSpec, trials: &[_]| {
-        let actions = if *spec == fine {
-            options.fine
-        } else {
-            ACTIONS.1
+    let mut learn =
+        |name, simulator: Option<&Simulator>, spec: &BehaviourSpec, trials: &[_]| -> Outcome<_> {
+            let actions = if *spec == fine {
+                options.fine
+            } else {
+                ACTIONS.1
+            };
+            let (spec, begin) = (spec.clone(), cpu_time());
+            let lesson = match simulator {
+                None => plane.learn(spec, trials, actions, rng, &mut until_stopped),
+                Some(simulator) => simulator.learn(spec, trials, actions, rng, &mut until_stopped),
+            };
+            go_on()?;
+            let seconds = cpu_time().saturating_sub(begin).as_secs_f64();
+            let row = scored(&lesson, starts);
+            bar.suspend(|| say!("{seed:4}  {name:32} {row}  {seconds:8.2}"));
+            bar.inc(1);
+            Ok(lesson)
         };
-        let (spec, begin) = (spec.clone(), cpu_time());
-        let lesson = match simulator {
-            None => plane.learn(spec, trials, actions, rng, &mut quiet),
-            Some(simulator) => simulator.learn(spec, trials, actions, rng, &mut quiet),
-        };
-        let seconds = cpu_time().saturating_sub(begin).as_secs_f64();
-        let row = scored(&lesson, starts);
-        bar.suspend(|| say!("{seed:4}  {name:32} {row}  {seconds:8.2}"));
-        bar.inc(1);
-        lesson
-    };
     let (found, none): (&[Percept], &[Percept]) = (&found, &[]);
-    let approaching = learn("exact plane, mended", None, &mended, found)?;
+    let approaching = learn("exact plane, mended", None, &mended, found)??;
     for (name, simulator, spec, trials) in [
         ("exact plane, mended, last table", None, &mended, none),
         ("exact plane, y goal 74..92", None, &wide.approaching, found),
@@ -184,8 +196,7 @@ fn learned_with(
         ("rigid regression, mended", Some(&rigid), &mended, found),
         ("linear regression, mended", Some(&linear), &mended, found),
     ] {
-        go_on()?;
-        let _ = learn(name, simulator, spec, trials);
+        let _ = learn(name, simulator, spec, trials)?;
     }
     Ok((centering, approaching))
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use grasp_agent::{Agent, AgentConfig, BehaviourPair, GoalInterval, Learned, OnlineLearning};
+use indicatif::ProgressBar;
 use pipeline_sim::{ErrorLevel, MoveForm};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -42,11 +43,25 @@ pub(crate) fn from_simulation_to_the_arm(arms: usize, out: &Path) -> Outcome {
     let mut csv = Table::create(out.join("on_the_arm.csv"), columns)?;
     let bar = progress_bar(6 * arms as u64, "arms", false);
     let mut panels = Vec::new();
+    let done = measure(arms, &bar, &mut csv, &mut panels);
+    bar.finish_and_clear();
+    // The arms until a fault are drawn.
+    done.and(write_svg(&out.join("on_the_arm.svg"), &panels, 2, SIZE))
+}
+
+/// Writes the rows of all simulators and levels, and adds a diagram for each simulator.
+fn measure(arms: usize, bar: &ProgressBar, csv: &mut Table, panels: &mut Vec<Panel>) -> Outcome {
     for (name, form) in [
         ("rigid regression", MoveForm::Rigid22),
         ("linear regression", MoveForm::Linear),
     ] {
-        let mut lines = Vec::new();
+        panels.push(Panel {
+            title: format!("first learned in the {name}"),
+            across: "moves learned from on the arm".into(),
+            up: "goal reached, %".into(),
+            top: Some(105.0),
+            ..Panel::default()
+        });
         for level in [ErrorLevel::None, ErrorLevel::Moderate, ErrorLevel::Heavy] {
             // Of each arm: centering at once, then the whole task after each number of moves.
             let mut scores = Vec::new();
@@ -85,19 +100,12 @@ pub(crate) fn from_simulation_to_the_arm(arms: usize, out: &Path) -> Outcome {
                     line.push((made as f64, mean));
                 }
             }
-            lines.push((format!("errors: {level}"), line));
+            if let Some(panel) = panels.last_mut() {
+                panel.lines.push((format!("errors: {level}"), line));
+            }
         }
-        panels.push(Panel {
-            title: format!("first learned in the {name}"),
-            across: "moves learned from on the arm".into(),
-            up: "goal reached, %".into(),
-            lines,
-            top: Some(105.0),
-            ..Panel::default()
-        });
     }
-    bar.finish_and_clear();
-    write_svg(&out.join("on_the_arm.svg"), &panels, 2, SIZE)
+    Ok(())
 }
 
 /// Returns the scores on one arm: centering at once, then the whole task after each of [`MOVES`].

@@ -33,8 +33,7 @@ struct Moment {
 /// Draws four columns, from the first sighting to the goal, of three rows: the pose from the side,
 /// the frame with the circle, its edges.
 pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Outcome<RgbImage> {
-    let mut rig = Rig::emulated(false, &Scene::bright_ball(), seed)?;
-    rig.stopped_by(STOP.clone());
+    let mut rig = Rig::emulated(false, &Scene::bright_ball(), seed, &STOP)?;
     let mut detector = BallDetector::default().build(seed)?;
     let config = AgentConfig::paper(Workspace::paper().search_poses());
     let mut agent = Agent::with_controller(config, learned.clone())?;

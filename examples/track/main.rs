@@ -11,6 +11,7 @@ use clap::Parser;
 use example_support::files::animated;
 use example_support::overlay::Overlay;
 use example_support::prelude::*;
+use example_support::program::stopped;
 use example_support::real::RealOptions;
 use example_support::stages::{Stages, Timed};
 use example_support::tally::{Counted, Tally};
@@ -261,6 +262,13 @@ impl Runs<'_> {
                 }
                 continue;
             }
+            let run_file = options.out.join(format!("run-{run:03}.json"));
+            if end.is_err() && stopped() {
+                let kept = keep_run(&run_file, &saved)?;
+                return Err(
+                    format!("run {run} was broken off: stopped by a signal; {kept}").into(),
+                );
+            }
             let trial = end.as_ref().ok();
             let success = trial.is_some_and(|trial| trial.held && trial.outcome.gave_up.is_none());
             let counted = Counted {
@@ -274,7 +282,7 @@ impl Runs<'_> {
             self.tally.cells[number].push(counted);
             let collisions = collisions.unwrap_or(0);
             if !success || collisions > 0 {
-                let kept = keep_run(&options.out.join(format!("run-{run:03}.json")), &saved)?;
+                let kept = keep_run(&run_file, &saved)?;
                 let reason = match &end {
                     Err(error) => error.to_string(),
                     Ok(_) if success => "grasped".into(),

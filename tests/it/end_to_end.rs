@@ -2,6 +2,8 @@
 //! controller on a pseudo-terminal (a socket where the system has none), rendered frames, the
 //! paper's detector, and the grip.
 
+use std::sync::Arc;
+
 use grasp_agent::{Agent, AgentConfig, EventKind, GaveUp};
 use hough_heuristic::CircleDetector;
 use pipeline_sim::{Ball, Scene, Workspace};
@@ -23,8 +25,8 @@ fn agent() -> Agent {
 #[test]
 fn balls_are_gripped_and_the_same_seed_repeats_the_run() {
     let run = |balls| {
-        let mut rig =
-            Rig::emulated(false, &Scene::bright_ball(), 3).expect("an emulated controller");
+        let mut rig = Rig::emulated(false, &Scene::bright_ball(), 3, &Arc::default())
+            .expect("an emulated controller");
         let mut agent = agent();
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
         let mut log = Vec::new();
@@ -55,7 +57,8 @@ fn balls_are_gripped_and_the_same_seed_repeats_the_run() {
 
 #[test]
 fn a_ball_out_of_view_is_reported_and_not_gripped() {
-    let mut rig = Rig::emulated(false, &Scene::bright_ball(), 3).expect("an emulated controller");
+    let mut rig = Rig::emulated(false, &Scene::bright_ball(), 3, &Arc::default())
+        .expect("an emulated controller");
     let mut agent = agent();
     // Behind the arm.
     rig.place(&Ball::at(-0.6, 0.0, -0.1))

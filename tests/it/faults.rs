@@ -1,6 +1,8 @@
 //! Faults of camera, detector, arm and line: the arm stops, the cause is the last event and a typed
 //! error, and the controller keeps what it had learned.
 
+use std::sync::Arc;
+
 use grasp_agent::{
     Agent, AgentConfig, AgentError, Belief, CameraEye, EventKind, EventLog, GaveUp, Hybrid,
     HybridSettings, Prior, RunOutcome,
@@ -17,7 +19,8 @@ const IN_VIEW: [f64; 3] = [0.6, 0.1, -0.1];
 const BEHIND_THE_ARM: [f64; 3] = [-0.6, 0.0, -0.1];
 
 fn rig(ball: [f64; 3]) -> Rig {
-    let mut rig = Rig::emulated(false, &Scene::bright_ball(), 5).expect("an emulated controller");
+    let mut rig = Rig::emulated(false, &Scene::bright_ball(), 5, &Arc::default())
+        .expect("an emulated controller");
     rig.place(&Ball::at(ball[0], ball[1], ball[2]))
         .expect("away from the hand");
     rig
@@ -311,8 +314,8 @@ fn a_line_that_dies_ends_the_run_and_keeps_the_belief() {
         let server =
             EmulatorServer::pty(emulator, ServeConfig::default()).expect("a pseudo-terminal");
         let path = server.address().to_owned();
-        let mut rig =
-            Rig::on_port(&path, 100.0, &Scene::bright_ball(), 5).expect("the controller answers");
+        let mut rig = Rig::on_port(&path, 100.0, &Scene::bright_ball(), 5, &Arc::default())
+            .expect("the controller answers");
         rig.place(&Ball::at(IN_VIEW[0], IN_VIEW[1], IN_VIEW[2]))
             .expect("away from the hand");
         let (mut agent, mut log, mut moves) = (agent(), EventLog::default(), 0);

@@ -2,6 +2,8 @@
 //! controller on a pseudo-terminal (a socket where the system has none), and with the arm of the
 //! cell itself.
 
+use std::sync::Arc;
+
 use example_support::trial::{FeatureEye, TrialCell};
 use grasp_agent::{
     Agent, AgentConfig, Controller, Decision, EventKind, EventLog, Feedback, GaveUp, Request,
@@ -12,7 +14,7 @@ use puma_grasp::{Rig, RigParts};
 use puma_val2::{ArmError, Gripper, JointDelta, Joints};
 
 fn rig() -> Rig {
-    Rig::emulated(false, &Scene::bright_ball(), 5).expect("an emulated controller")
+    Rig::emulated(false, &Scene::bright_ball(), 5, &Arc::default()).expect("an emulated controller")
 }
 
 /// A ball in view of a search pose, the pose in which it shows in the middle of the goal, and the

@@ -3,7 +3,9 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, Command, Output, Stdio};
-use std::time::Duration;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use grasp_agent::{EventKind, SavedRun};
 use hough_heuristic::image::GrayImage;
@@ -29,7 +31,9 @@ impl Cell {
         assert!(pipe.expect("mkfifo is there").success());
         let mut cell = example("emulated_cell")?;
         cell.current_dir(folder.path())
-            .args(["--link", "puma", "--video", "camera"]);
+            .args(["--link", "puma", "--video", "camera"])
+            // Small frames: cheap to draw and to search.
+            .args(["--size", "384x288"]);
         cell.stdin(Stdio::piped()).stderr(Stdio::piped());
         let mut process = cell.spawn().expect("the cell starts");
         let (panel, answers) = (
@@ -120,7 +124,7 @@ fn the_papers_whole_way_is_gone_on_the_arm_itself() {
     grasp.args([
         "--teach-goal",
         "--sample",
-        "30",
+        "20",
         "--simulator",
         "rigid8",
         "--keep-learning",
@@ -182,8 +186,8 @@ fn a_camera_that_dies_stops_the_arm_and_keeps_the_run() {
     ] {
         let cell = or_skip!(Cell::start());
         let policy = policy_file(cell.folder.path());
-        // 40 frames of 768x576 pixels behind a header, then something else.
-        let bytes = "YUV4MPEG2 W768 H576 F25:1 Ip A1:1 Cmono\n".len() + 40 * (6 + 768 * 576);
+        // 15 frames of 384x288 pixels behind a header, then something else.
+        let bytes = "YUV4MPEG2 W384 H288 F25:1 Ip A1:1 Cmono\n".len() + 15 * (6 + 384 * 288);
         let camera = format!("| head -c {bytes} camera; {after}");
         let mut grasp = or_skip!(cell.driven_by("grasp", &camera));
         let (end, errors) = output(grasp.args(["--policy", &policy, "--yes"]));
@@ -257,7 +261,7 @@ fn numbered(last: u8, width: fn(u8) -> u32) -> LiveCamera {
             width,
         })
     };
-    let mut camera = LiveCamera::over("test", open).expect("a frame");
+    let mut camera = LiveCamera::over("test", &Arc::default(), open).expect("a frame");
     camera.delay = Duration::from_millis(50);
     camera
 }
@@ -299,13 +303,51 @@ fn stalls_and_changes_of_size_are_errors_that_name_the_camera() {
 }
 
 #[test]
+fn a_wait_for_a_frame_ends_at_once_on_request() {
+    let stop = Arc::new(AtomicBool::new(false));
+    let open = || {
+        Ok(Numbered {
+            next: 0,
+            last: 0,
+            width: |_| 4,
+        })
+    };
+    let mut camera = LiveCamera::over("test", &stop, open).expect("a frame");
+    let begin = Instant::now();
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            std::thread::sleep(Duration::from_millis(50));
+            stop.store(true, Ordering::Relaxed);
+        });
+        let end = camera.grab(&mut GrayImage::default()).expect_err("stopped");
+        assert!(end.to_string().contains("stopped on request"), "{end}");
+    });
+    assert!(begin.elapsed() < Duration::from_secs(2));
+}
+
+#[test]
+fn a_device_by_name_is_a_camera_or_named_as_none() {
+    for name in ["v4l2:/dev/null", "/dev/video99"] {
+        let camera = LiveCamera::open(name, None, &Arc::default());
+        let said = camera.expect_err("no camera").to_string();
+        let path = name.trim_start_matches("v4l2:");
+        assert!(said.starts_with(&format!("camera {path}: ")), "{said}");
+        assert_eq!(
+            said.contains("--features v4l2"),
+            !cfg!(feature = "v4l2"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
 fn a_recording_is_delivered_frame_by_frame() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("film.raw");
     let frames: Vec<u8> = (0..30).flat_map(|number| [number; 6]).collect();
     std::fs::write(&path, &frames[..frames.len() - 1]).expect("a file");
     let source = path.to_str().expect("plain text");
-    let mut camera = LiveCamera::open(source, Some((3, 2))).expect("a recording");
+    let mut camera = LiveCamera::open(source, Some((3, 2)), &Arc::default()).expect("a recording");
     let mut frame = GrayImage::default();
     for number in 0..29 {
         camera.grab(&mut frame).expect("a frame");

@@ -1,11 +1,13 @@
 //! Programs that a signal stops.
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::fs::File;
+use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use grasp_agent::SavedRun;
+use grasp_agent::{Behaviour, BehaviourPair, SavedRun};
 
 use crate::command_line::{example, or_skip, policy_file, wait_for_frames};
 
@@ -74,59 +76,197 @@ fn interrupt(program: &Child) {
     assert!(kill.status().expect("kill is there").success());
 }
 
+/// A program in a folder of its own, in which it writes what it says to `said`.
+struct Running {
+    program: Child,
+    folder: tempfile::TempDir,
+}
+
+impl Running {
+    fn start(name: &str, arguments: &[&str]) -> Option<Self> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let said = File::create(folder.path().join("said")).expect("a file");
+        let mut program = example(name)?;
+        program.args(arguments).current_dir(folder.path());
+        program.stdin(Stdio::null()).stdout(said);
+        let program = program.stderr(Stdio::piped()).spawn().expect("it starts");
+        Some(Self { program, folder })
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn wait_until(&mut self, begun: impl Fn(&Path) -> bool) {
+        while !begun(self.folder.path()) && self.program.try_wait().expect("a process").is_none() {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Interrupts the program and returns what it writes to standard error.
+    fn interrupted(&mut self) -> String {
+        /// A second, and what a busy machine adds. To the end of their work they need a minute.
+        const SOON: Duration = Duration::from_secs(10);
+        interrupt(&self.program);
+        let (begin, mut errors) = (Instant::now(), String::new());
+        let mut screen = self.program.stderr.take().expect("a pipe");
+        screen.read_to_string(&mut errors).expect("text");
+        let code = self.program.wait().expect("it ends").code();
+        let took = begin.elapsed();
+        assert!(took < SOON, "it went on for {took:?}: {errors}");
+        assert_eq!(code, Some(130), "{errors}");
+        errors
+    }
+}
+
+fn says(words: &str) -> impl Fn(&Path) -> bool {
+    move |folder| {
+        std::fs::read_to_string(folder.join("said")).is_ok_and(|said| said.contains(words))
+    }
+}
+
+fn is_there(file: &str) -> impl Fn(&Path) -> bool {
+    move |folder| folder.join(file).exists()
+}
+
+#[test]
+fn learning_stopped_by_ctrl_c_keeps_what_was_learned() {
+    let mut grasp = or_skip!(Running::start("grasp", &["--fine", "--runs", "1"]));
+    grasp.wait_until(says("learned centering"));
+    let errors = grasp.interrupted();
+    assert!(
+        errors.contains("of 4000000 actions of approaching"),
+        "{errors}"
+    );
+    let (paper, mut pair) = (BehaviourPair::paper_mended(), BehaviourPair::fine());
+    pair.centering.reward = paper.centering.reward;
+    pair.approaching.reward = paper.approaching.reward;
+    for spec in [pair.centering, pair.approaching] {
+        let file = format!("out/grasp/unfinished/{}.policy", spec.name);
+        Behaviour::load(&grasp.path(&file), &spec).expect("what was learned");
+    }
+    let summary = std::fs::read_to_string(grasp.path("out/grasp/summary.json"));
+    assert!(summary.expect("the training").contains("\"trained\": true"));
+    assert!(grasp.path("out/grasp/learning.svg").exists());
+    assert!(!grasp.path("out/grasp/approaching.policy").exists());
+}
+
+#[test]
+fn no_wait_for_a_camera_or_controller_outlives_ctrl_c() {
+    let silent = TcpListener::bind("127.0.0.1:0").expect("a socket");
+    let address = silent.local_addr().expect("its address").to_string();
+    for more in [&["--camera", "| sleep 9"][..], &["--rendered"]] {
+        let line = [&["--tcp", &address, "--yes"], more].concat();
+        let mut grasp = or_skip!(Running::start("grasp", &line));
+        grasp.wait_until(is_there("out/grasp/.lock"));
+        std::thread::sleep(Duration::from_millis(300));
+        let errors = grasp.interrupted();
+        assert!(errors.contains("stopped by a signal"), "{errors}");
+    }
+}
+
+#[test]
+fn long_programs_end_at_ctrl_c_with_their_results() {
+    for (name, arguments, sign, result) in [
+        (
+            "compare_controllers",
+            &["--only", "Q 540"][..],
+            "out/compare/.lock",
+            "out/compare",
+        ),
+        (
+            "compare_controllers",
+            &["--only", "fuzzy", "--draws", "999"],
+            "out/compare/cells/none-00001.json",
+            "out/compare/comparison.svg",
+        ),
+        ("paper_figures", &[], "out/figures/.lock", "out/figures"),
+        ("ellipse_object", &[], "out/egg/.lock", "out/egg"),
+        (
+            "ellipse_object",
+            &[],
+            "out/egg/egg001.png",
+            "out/egg/egg001.png",
+        ),
+        (
+            "track",
+            &["--shortcut", "--runs", "9000"],
+            "out/track/.lock",
+            "out/track",
+        ),
+        (
+            "track",
+            &[],
+            "out/track/camera.belief",
+            "out/track/track.csv",
+        ),
+        (
+            "render_dataset",
+            &["--frames", "900"],
+            "out/rendered/frames.csv",
+            "out/rendered/truth.csv",
+        ),
+        (
+            "emulated_cell",
+            &["--link", "puma", "--video", "film"],
+            "film",
+            "film",
+        ),
+    ] {
+        let mut program = or_skip!(Running::start(name, arguments));
+        program.wait_until(is_there(sign));
+        std::thread::sleep(Duration::from_millis(300));
+        let errors = program.interrupted();
+        assert!(errors.contains("stopped by a signal"), "{name}: {errors}");
+        assert!(program.path(result).exists(), "{name} wrote no {result}");
+    }
+}
+
+#[test]
+fn a_figure_of_the_tables_until_ctrl_c_is_drawn() {
+    let arguments = ["--starts", "1", "--learning-only", "--seeds", "2"];
+    let mut figures = or_skip!(Running::start("paper_figures", &arguments));
+    figures.wait_until(says("exact plane, mended "));
+    figures.interrupted();
+    assert!(figures.path("out/figures/figure6.svg").exists());
+}
+
 #[test]
 fn a_second_ctrl_c_ends_at_once() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let mut grasp = or_skip!(example("grasp"));
-    // Learning goes on after the first one.
-    grasp
-        .args(["--fine", "--runs", "1", "--out"])
-        .arg(folder.path().join("out"));
-    grasp.stdout(Stdio::piped()).stderr(Stdio::null());
-    let mut grasp = grasp.spawn().expect("grasp starts");
-    let mut said = BufReader::new(grasp.stdout.take().expect("its output")).lines();
-    said.find(|line| {
-        line.as_ref()
-            .is_ok_and(|line| line.contains("learned centering"))
-    });
-    interrupt(&grasp);
-    std::thread::sleep(Duration::from_millis(200));
-    assert!(
-        grasp.try_wait().expect("a process").is_none(),
-        "the first one has ended it"
-    );
-    interrupt(&grasp);
-    let begin = std::time::Instant::now();
-    assert_eq!(grasp.wait().expect("grasp ends").code(), Some(130));
-    assert!(begin.elapsed() < Duration::from_secs(1));
+    let film = folder.path().join("film");
+    let pipe = Command::new("mkfifo").arg(&film).status();
+    assert!(pipe.expect("mkfifo is there").success());
+    // A reader that never reads holds the program up.
+    let reader = File::options()
+        .read(true)
+        .write(true)
+        .open(&film)
+        .expect("a pipe");
+    let film = film.to_str().expect("plain text");
+    let mut cell = or_skip!(Running::start(
+        "emulated_cell",
+        &["--link", "puma", "--video", film]
+    ));
+    cell.wait_until(is_there("puma"));
+    std::thread::sleep(Duration::from_millis(700));
+    interrupt(&cell.program);
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(cell.program.try_wait().expect("a process").is_none());
+    cell.interrupted();
+    drop(reader);
 }
 
 #[test]
 fn detect_circles_stopped_by_ctrl_c_keeps_its_results() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let picture = folder.path().join("picture.pgm");
-    std::fs::write(
-        &picture,
-        [&b"P5 2000 2000 255\n"[..], &[90; 4_000_000]].concat(),
-    )
-    .expect("a file");
-    let csv = folder.path().join("circles.csv");
-    let mut detect = or_skip!(example("detect_circles"));
-    detect
-        .arg("--overlay")
-        .arg(folder.path())
-        .arg("--csv")
-        .arg(&csv);
-    let mut detect = detect
-        .args(vec![&picture; 2000])
-        .spawn()
-        .expect("it starts");
-    while !folder.path().join("picture.png").exists()
-        && detect.try_wait().expect("a process").is_none()
-    {
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    interrupt(&detect);
-    assert_eq!(detect.wait().expect("it ends").code(), Some(130));
-    assert!(csv.exists());
+    let gray = [&b"P5 2000 2000 255\n"[..], &[90; 4_000_000]].concat();
+    std::fs::write(&picture, gray).expect("a file");
+    let mut arguments = vec!["--overlay", ".", "--csv", "circles.csv"];
+    arguments.resize(2_000, picture.to_str().expect("plain text"));
+    let mut detect = or_skip!(Running::start("detect_circles", &arguments));
+    detect.wait_until(is_there("picture.png"));
+    detect.interrupted();
+    assert!(detect.path("circles.csv").exists());
 }

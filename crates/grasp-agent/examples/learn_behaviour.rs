@@ -7,6 +7,7 @@
 #![allow(clippy::print_stdout, reason = "a program for a terminal")]
 
 use std::error::Error;
+use std::ops::ControlFlow;
 
 use grasp_agent::hough_heuristic::Features;
 use grasp_agent::puma_val2::{Joint, JointDelta};
@@ -37,7 +38,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let spec = BehaviourSpec::centering();
     let settings = LearningSettings::paper(50_000)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-    let lesson = spec.learn(simulate, start, &[], &settings, &mut rng, &mut |_| ())?;
+    let lesson = spec.learn(simulate, start, &[], &settings, &mut rng, &mut |_| {
+        ControlFlow::Continue(())
+    })?;
     for record in lesson.curve.iter().step_by(10) {
         let success = record.success_share.unwrap_or(0.0);
         println!("{:6} actions: goal reached in {success:.2}", record.actions);

@@ -1,13 +1,15 @@
 //! The paper's simulator, and both behaviours learned in it.
 
-use grasp_agent::{BehaviourError, BehaviourPair, Learned, Percept};
+use std::ops::ControlFlow;
+
+use grasp_agent::{BehaviourPair, Learned, Percept};
 use pipeline_sim::{Ball, Cell, MoveForm};
 use puma_grasp::Simulator;
 use qtable::Record;
 use rand::Rng;
 
 use crate::plane::search_percepts;
-use crate::program::Outcome;
+use crate::program::{Outcome, go_on, stopped};
 
 /// Moves sampled in the cell for the regression.
 pub const SAMPLES: usize = 2_500;
@@ -47,25 +49,41 @@ pub fn anywhere(simulator: &Simulator, count: usize, rng: &mut dyn Rng) -> Vec<P
     (0..count).map(|_| simulator.start(rng)).collect()
 }
 
-/// Shows no progress of learning.
-pub fn quiet(_: &Record) {}
+/// Shows no progress of learning, and ends it when the program is to stop.
+pub fn until_stopped(_: &Record) -> ControlFlow<()> {
+    if stopped() {
+        return ControlFlow::Break(());
+    }
+    ControlFlow::Continue(())
+}
+
+/// Fails if a signal has ended the learning, and says that nothing of it was kept.
+///
+/// # Errors
+/// A signal.
+pub fn learned_whole() -> Outcome {
+    let lost = |stopped| format!("{stopped}; what was learned by then is not kept").into();
+    go_on().map_err(lost)
+}
 
 /// Learns both behaviours with [`ACTIONS`] and [`TRIALS`]. `seed` is that of the balls from which
 /// approaching is tried.
 ///
 /// # Errors
-/// Those of [`Simulator::learn`].
+/// Those of [`Simulator::learn`], and a signal.
 pub fn learn_both(
     simulator: &Simulator,
     pair: BehaviourPair,
     seed: u64,
     rng: &mut dyn Rng,
-) -> Result<Learned, BehaviourError> {
+) -> Outcome<Learned> {
     let (starts, found) = (
         anywhere(simulator, TRIALS, rng),
         search_percepts(TRIALS, seed),
     );
-    let centering = simulator.learn(pair.centering, &starts, ACTIONS.0, rng, &mut quiet)?;
-    let approaching = simulator.learn(pair.approaching, &found, ACTIONS.1, rng, &mut quiet)?;
+    let centering = simulator.learn(pair.centering, &starts, ACTIONS.0, rng, &mut until_stopped)?;
+    let approaching =
+        simulator.learn(pair.approaching, &found, ACTIONS.1, rng, &mut until_stopped)?;
+    learned_whole()?;
     Ok(Learned::new(centering.behaviour, approaching.behaviour))
 }

@@ -5,7 +5,7 @@
 #[cfg(feature = "live")]
 mod server;
 
-use grasp_agent::RunEvent;
+use grasp_agent::{GoalInterval, RunEvent};
 use image::RgbImage;
 use qtable::Record;
 
@@ -56,6 +56,16 @@ impl Live {
         }
         #[cfg(not(feature = "live"))]
         let _ = (name, record);
+    }
+
+    /// Shows the goal of the runs to come.
+    pub fn goal(&self, goal: &[GoalInterval]) {
+        #[cfg(feature = "live")]
+        if let Some(server) = &self.server {
+            server.tell(&serde_json::json!({ "type": "goal", "goal": goal }));
+        }
+        #[cfg(not(feature = "live"))]
+        let _ = goal;
     }
 
     /// Shows an event of run number `run`, with its frame if there is one.

@@ -4,6 +4,8 @@
 //! With the ball in the plane that the arm moves in, `JT2` and `JT3` decide everything and (y, r,
 //! theta 3) is the whole state. Centering has nothing to do here.
 
+use std::ops::ControlFlow;
+
 use grasp_agent::{
     Behaviour, BehaviourError, BehaviourSpec, CameraModel, JointLimits, LearningSettings, Lesson,
     Percept,
@@ -16,6 +18,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 
 use crate::learning::paper_cell;
+use crate::program::{progress_bar, stopped};
 
 /// A simulator of approaching with the exact geometry, and the starts to learn from.
 #[derive(Clone, Debug)]
@@ -93,7 +96,7 @@ impl ExactPlane {
         trials: &[Percept],
         actions: u64,
         rng: &mut dyn Rng,
-        on_progress: &mut dyn FnMut(&Record),
+        on_progress: &mut dyn FnMut(&Record) -> ControlFlow<()>,
     ) -> Result<Lesson, BehaviourError> {
         let mut plane = self.model.approaching(JointLimits::paper());
         let simulate = |percept: &Percept, delta: &JointDelta| {
@@ -124,7 +127,11 @@ pub fn search_starts(count: usize, seed: u64) -> Vec<PlaneStart> {
             optimum,
         })
     });
-    starts.take(count).collect()
+    let bar = progress_bar(count as u64, "starts", false);
+    let starts = bar.wrap_iter(starts.take(count));
+    let starts = starts.take_while(|_| !stopped()).collect();
+    bar.finish_and_clear();
+    starts
 }
 
 /// Returns what is perceived of `count` balls where the search finds them, turned into the arm's

@@ -17,6 +17,9 @@ pub type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 /// Exit code of a program that a signal has stopped.
 const STOPPED: u8 = 130;
 
+/// Reason of a run that a signal has stopped.
+const BY_SIGNAL: &str = "stopped by a signal";
+
 /// Flag that the first SIGINT (Ctrl-C) or SIGTERM sets.
 pub static STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
@@ -34,7 +37,13 @@ pub fn start<O: Parser>(run: impl FnOnce(&O) -> Outcome) -> ExitCode {
     match run(&options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            let words = error.to_string();
+            // A fault may come of the stop, such as an order that did not end.
+            let reason = match stopped() && !words.contains(BY_SIGNAL) {
+                true => format!("{BY_SIGNAL}: {words}"),
+                false => words,
+            };
+            eprintln!("error: {reason}");
             ExitCode::from(if stopped() { STOPPED } else { 1 })
         }
     }
@@ -51,7 +60,7 @@ pub fn stopped() -> bool {
 /// A signal.
 pub fn go_on() -> Outcome {
     if stopped() {
-        return Err("stopped by a signal".into());
+        return Err(BY_SIGNAL.into());
     }
     Ok(())
 }

@@ -25,10 +25,11 @@ pub struct RealOptions {
     #[arg(long, value_name = "ADDR")]
     pub tcp: Option<String>,
     /// Frames of a real camera on the hand, Y4M or with --raw: `-` for standard input, a named
-    /// pipe, or `| COMMAND`, such as '| ffmpeg -i /dev/video0 -f yuv4mpegpipe -pix_fmt yuv420p -'
+    /// pipe, or `| COMMAND`, such as '| ffmpeg -i /dev/video0 -f yuv4mpegpipe -pix_fmt yuv420p -';
+    /// or a device of Linux, /dev/video0 (cargo's --features v4l2)
     #[arg(long, value_name = "SOURCE", conflicts_with = "rendered")]
     pub camera: Option<String>,
-    /// Size of the frames of --camera, which are bytes of gray without any header
+    /// Size of the frames of --camera: of a device; or of bytes of gray without any header
     #[arg(long, value_name = "WxH", requires = "camera", value_parser = size)]
     pub raw: Option<(u32, u32)>,
     /// Longest time from the exposure of a frame to its arrival, milliseconds; frames that arrive
@@ -49,7 +50,11 @@ pub struct RealOptions {
     pub yes: bool,
 }
 
-fn size(text: &str) -> Result<(u32, u32), String> {
+/// Parses the size of a frame, for the command line.
+///
+/// # Errors
+/// Text that is no such size.
+pub fn size(text: &str) -> Result<(u32, u32), String> {
     let sides = text.split_once('x').and_then(|(width, height)| {
         let sides: (u32, u32) = (width.parse().ok()?, height.parse().ok()?);
         (sides.0 > 0 && sides.1 > 0).then_some(sides)
@@ -160,14 +165,13 @@ impl RealOptions {
             }
         }
         let mut rig = match (&self.port, &self.tcp) {
-            (None, None) => Rig::emulated(realtime, scene, seed)?,
-            (None, Some(address)) => Rig::on_socket(address, self.speed, scene, seed)?,
+            (None, None) => Rig::emulated(realtime, scene, seed, &STOP)?,
+            (None, Some(address)) => Rig::on_socket(address, self.speed, scene, seed, &STOP)?,
             #[cfg(feature = "serial")]
-            (Some(path), _) => Rig::on_port(path, self.speed, scene, seed)?,
+            (Some(path), _) => Rig::on_port(path, self.speed, scene, seed, &STOP)?,
             #[cfg(not(feature = "serial"))]
             (Some(_), _) => return Err("this program was built without serial lines".into()),
         };
-        rig.stopped_by(STOP.clone());
         rig.cell()
             .with(|cell| cell.ball.radius = self.ball_radius / 1000.0);
         if let Some(camera) = camera {
@@ -180,7 +184,7 @@ impl RealOptions {
         let Some(source) = &self.camera else {
             return Ok(None);
         };
-        let mut camera = LiveCamera::open(source, self.raw)?;
+        let mut camera = LiveCamera::open(source, self.raw, &STOP)?;
         camera.delay = Duration::from_millis(self.camera_delay);
         Ok(Some(camera))
     }

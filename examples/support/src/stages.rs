@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::fmt;
 use std::rc::Rc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use grasp_agent::{Controller, Decision, Feedback, GaveUp, Request, SavedController, Sighting};
 use hough_heuristic::image::GrayImage;
@@ -31,12 +31,16 @@ pub struct Stages(Rc<RefCell<Spent>>);
 #[derive(Clone, Copy, Debug, Default)]
 struct Spent {
     moves: u32,
-    render: Duration,
+    /// Time of the camera: of rendering, unless it is a real one.
+    camera: Duration,
     detect: Duration,
     decide: Duration,
     serial: Duration,
-    /// Wall time while the arm was driven.
+    /// Wall time while the arm was driven, and while frames were taken.
     driven: Duration,
+    watched: Duration,
+    /// Set if a real camera takes the frames.
+    real: bool,
 }
 
 impl Stages {
@@ -48,6 +52,11 @@ impl Stages {
         }
     }
 
+    /// Says that a real camera takes the frames.
+    pub fn of_real_camera(&self) {
+        self.0.borrow_mut().real = true;
+    }
+
     fn measured<T>(&self, stage: fn(&mut Spent) -> &mut Duration, work: impl FnOnce() -> T) -> T {
         let begin = cpu_time();
         let result = work();
@@ -56,7 +65,7 @@ impl Stages {
     }
 
     fn driven<T>(&self, work: impl FnOnce() -> T) -> T {
-        let begin = std::time::Instant::now();
+        let begin = Instant::now();
         let result = self.measured(|spent| &mut spent.serial, work);
         self.0.borrow_mut().driven += begin.elapsed();
         result
@@ -70,15 +79,21 @@ impl fmt::Display for Stages {
         write!(
             f,
             "per move, ms of CPU: edges and circle {:.2}, decision {:.3}, serial line {:.2}; \
-             waiting for the arm {:.2} ms; rendering {:.2} ms of CPU, which a camera would not \
-             need ({} moves)",
+             waiting for the arm {:.2} ms; ",
             each(spent.detect),
             each(spent.decide),
             each(spent.serial),
             each(spent.driven.saturating_sub(spent.serial)),
-            each(spent.render),
-            spent.moves
-        )
+        )?;
+        let (camera, waited) = (each(spent.camera), each(spent.watched));
+        match spent.real {
+            true => write!(f, "waiting for frames {waited:.0} ms")?,
+            false => write!(
+                f,
+                "rendering {camera:.2} ms of CPU, which a camera would not need"
+            )?,
+        }
+        write!(f, " ({} moves)", spent.moves)
     }
 }
 
@@ -93,8 +108,12 @@ pub struct Timed<T> {
 
 impl FrameSource for Timed<&mut dyn FrameSource> {
     fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
-        self.stages
-            .measured(|spent| &mut spent.render, || self.inner.grab(frame))
+        let begin = Instant::now();
+        let grabbed = self
+            .stages
+            .measured(|spent| &mut spent.camera, || self.inner.grab(frame));
+        self.stages.0.borrow_mut().watched += begin.elapsed();
+        grabbed
     }
 }
 

@@ -1,8 +1,8 @@
 //! One ball and an agent that goes for it; and the cell without rendering, the feature shortcut.
 
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, CameraEye, Controller, EventKind, Eye, RunEvent, RunOutcome,
-    ServoSettings, Sighting, TaughtGoal,
+    Agent, AgentConfig, AgentError, CameraEye, Controller, EventKind, Eye, GoalInterval, Input,
+    RunEvent, RunOutcome, ServoSettings, Sighting, TaughtGoal,
 };
 use hough_heuristic::{CircleDetector, Features, FrameError};
 use pipeline_sim::{
@@ -28,6 +28,17 @@ pub const FEATURES: [Feature; 3] = [
     ("y", (74.0, 82.0), 144.0, |f| f.y),
     ("r", (32.0, 34.0), 68.0, |f| f.r),
 ];
+
+/// Returns the interval of each feature in the goal of an agent, in the order of [`FEATURES`]; the
+/// paper's if the agent has none.
+pub fn goal_of(goal: &[GoalInterval]) -> [(f64, f64); 3] {
+    let mut inputs = [Input::X, Input::Y, Input::R].into_iter();
+    FEATURES.map(|(_, paper, ..)| {
+        let input = inputs.next();
+        let own = goal.iter().find(|interval| Some(interval.input) == input);
+        own.map_or(paper, |own| (own.low, own.high))
+    })
+}
 
 /// Returns whether the ball stands at the paper's goal.
 pub fn at_goal(features: &Features) -> bool {
@@ -72,6 +83,9 @@ pub fn run_on_rig<C: Controller>(
     observe: &mut dyn FnMut(&RunEvent<'_>),
 ) -> Result<Trial, AgentError> {
     let (cell, simulated) = (rig.cell().clone(), rig.is_simulated());
+    if !simulated {
+        stages.of_real_camera();
+    }
     let RigParts {
         camera,
         arm,
@@ -127,8 +141,7 @@ fn reach<C: Controller>(
 /// # Errors
 /// Those of [`Rig::emulated`], and the quantity that is out of range.
 pub fn rig_with_errors(errors: &Errors, scene: &Scene, seed: u64) -> Outcome<Rig> {
-    let rig = Rig::emulated(false, scene, seed)?;
-    rig.stopped_by(STOP.clone());
+    let rig = Rig::emulated(false, scene, seed, &STOP)?;
     make_errors(&rig, errors)?;
     Ok(rig)
 }

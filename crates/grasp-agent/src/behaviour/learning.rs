@@ -79,6 +79,8 @@ impl BehaviourSpec {
     /// each update may lose a way here and find one there.
     ///
     /// ```
+    /// use std::ops::ControlFlow;
+    ///
     /// use grasp_agent::hough_heuristic::Features;
     /// use grasp_agent::puma_val2::{Joint, JointDelta};
     /// use grasp_agent::qtable::rand::{Rng, RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
@@ -98,11 +100,15 @@ impl BehaviourSpec {
     ///     let settings = LearningSettings::paper(20_000)?;
     ///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     ///     let spec = BehaviourSpec::centering();
-    ///     let lesson = spec.learn(simulate, start, &[], &settings, &mut rng, &mut |_| ())?;
+    ///     let go_on = &mut |_: &_| ControlFlow::Continue(());
+    ///     let lesson = spec.learn(simulate, start, &[], &settings, &mut rng, go_on)?;
     ///     assert!(lesson.curve.last().and_then(|record| record.success_share) > Some(0.9));
     ///     Ok(())
     /// }
     /// ```
+    ///
+    /// `on_progress` is called with each record. Its [`ControlFlow::Break`] ends the learning; the
+    /// lesson is then that of the actions so far.
     ///
     /// # Errors
     /// [`BehaviourError::Settings`] for a specification that cannot be run, and a reward that is
@@ -114,7 +120,7 @@ impl BehaviourSpec {
         trials: &[Percept],
         settings: &LearningSettings,
         rng: &mut dyn Rng,
-        on_progress: &mut dyn FnMut(&Record),
+        on_progress: &mut dyn FnMut(&Record) -> ControlFlow<()>,
     ) -> Result<Lesson, BehaviourError> {
         /// Parts from record to record in which α and the temperature stand still.
         const BLOCKS: u64 = 5;
@@ -137,11 +143,14 @@ impl BehaviourSpec {
             let to = training.actions() + part;
             training = training.with_record_every(part)?;
             let mut task = BehaviourTask::new(&spec, gamma, &mut simulate, &mut start);
-            training.run_in_blocks(&mut task, Until::Actions(to), BLOCKS, rng, |record, _| {
-                on_progress(record);
-                ControlFlow::Continue(())
+            let until = Until::Actions(to);
+            let ended = training.run_in_blocks(&mut task, until, BLOCKS, rng, |record, _| {
+                on_progress(record)
             })?;
             training.end_episode();
+            if ended {
+                break;
+            }
             if !trials.is_empty() && 2 * to > actions {
                 let behaviour = Behaviour::new(spec.clone(), training.table().clone())?;
                 let fewest = best.as_ref().map_or(usize::MAX, |(fewest, ..)| *fewest);
@@ -152,7 +161,7 @@ impl BehaviourSpec {
             }
         }
         let curve = training.take_curve();
-        let last = (actions, training.into_parts().0);
+        let last = (training.actions(), training.into_parts().0);
         let (learned_by, table) = best.map_or(last, |(_, by, table)| (by, table));
         Ok(Lesson {
             behaviour: Behaviour::new(spec, table)?,
