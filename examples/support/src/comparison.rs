@@ -138,7 +138,7 @@ pub fn plot(rows: &[Row], success: &str) -> Outcome<String> {
     }
     let most = rows.iter().map(|row| row.cycles).fold(1.0, f64::max);
     let size = (
-        NAMES + COLUMN * levels.len() as i32,
+        (NAMES + COLUMN * levels.len() as i32).max(640),
         HEAD + LINE * names.len() as i32 + 12,
     );
     let ink = RGBColor(40, 40, 60);
@@ -150,7 +150,8 @@ pub fn plot(rows: &[Row], success: &str) -> Outcome<String> {
         let words = |text: String, at: (i32, i32), size: i32| {
             Text::new(text, at, ("sans-serif", size).into_font().color(&ink))
         };
-        let title = format!("Bars and numbers: moves of a run that succeeded. Percent: {success}.");
+        let title = format!("Bars and numbers: moves of a run that succeeded. Percent: {success}.")
+            + " Green: calibrates itself.";
         root.draw(&words(title, (10, 10), 13))?;
         for (level, left) in levels.iter().zip((NAMES..).step_by(COLUMN as usize)) {
             root.draw(&words(format!("errors: {level}"), (left, 34), 14))?;
@@ -163,7 +164,7 @@ pub fn plot(rows: &[Row], success: &str) -> Outcome<String> {
                 root.draw(&words(row.name.clone(), (10, top + 2), 13))?;
             }
             let colour = if row.name.starts_with("hybrid") {
-                RGBColor(200, 60, 50)
+                RGBColor(20, 140, 120)
             } else {
                 RGBColor(90, 120, 185)
             };

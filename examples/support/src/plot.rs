@@ -23,7 +23,7 @@ pub struct Panel {
     pub up: String,
     /// Lines, each in a colour of its own.
     pub lines: Vec<Line>,
-    /// Lines in gray behind the others.
+    /// Lines in gray behind the others, each of another run.
     pub behind: Vec<Vec<(f64, f64)>>,
     /// Place, lower and upper end of the band.
     pub band: Vec<(f64, f64, f64)>,
@@ -36,10 +36,10 @@ pub struct Panel {
 const COLOURS: [RGBColor; 6] = [
     RGBColor(30, 90, 180),
     RGBColor(190, 70, 40),
-    RGBColor(40, 140, 70),
     RGBColor(140, 70, 160),
     RGBColor(200, 150, 0),
     RGBColor(90, 90, 90),
+    RGBColor(0, 140, 150),
 ];
 const GOAL: RGBColor = RGBColor(120, 190, 120);
 const GRAY: RGBColor = RGBColor(200, 200, 205);
@@ -139,8 +139,14 @@ impl Panel {
                     Rectangle::new([(x, y - 5), (x + 16, y + 5)], colour.filled())
                 });
         }
-        for line in &self.behind {
-            chart.draw_series(LineSeries::new(line.iter().copied(), GRAY.stroke_width(2)))?;
+        for (number, line) in self.behind.iter().enumerate() {
+            let style = GRAY.stroke_width(2);
+            let drawn = chart.draw_series(LineSeries::new(line.iter().copied(), style))?;
+            if number == 0 {
+                drawn
+                    .label("other runs")
+                    .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], style));
+            }
         }
         for ((name, line), colour) in self.lines.iter().zip(COLOURS.iter().cycle()) {
             let style = colour.stroke_width(2);
@@ -158,13 +164,47 @@ impl Panel {
         if named || self.goal.is_some() || !self.band.is_empty() {
             chart
                 .configure_series_labels()
-                .position(SeriesLabelPosition::LowerRight)
+                .position(self.free_corner(right, top))
                 .background_style(WHITE.mix(0.85))
                 .border_style(GRAY)
                 .label_font(("sans-serif", 12))
                 .draw()?;
         }
         Ok(())
+    }
+
+    /// Returns the corner for the legend that the lines pass through least.
+    fn free_corner(&self, right: f64, top: f64) -> SeriesLabelPosition {
+        /// Share of the diagram that a legend takes at most.
+        const SIZE: (f64, f64) = (0.42, 0.35);
+        let along = |ends: &[(f64, f64)]| {
+            let [(x0, y0), (x1, y1)] = [ends[0], ends[1]];
+            (0..=20).map(move |i| {
+                let t = f64::from(i) / 20.0;
+                ((x0 + t * (x1 - x0)) / right, (y0 + t * (y1 - y0)) / top)
+            })
+        };
+        let lines = || self.lines.iter().map(|(_, line)| line).chain(&self.behind);
+        let points = || lines().flat_map(|line| line.windows(2).flat_map(along));
+        let corners = [
+            (SeriesLabelPosition::LowerRight, false, true),
+            (SeriesLabelPosition::UpperRight, true, true),
+            (SeriesLabelPosition::LowerLeft, false, false),
+            (SeriesLabelPosition::UpperLeft, true, false),
+        ];
+        let inside = |upper: bool, at_right: bool| {
+            let beyond = |place: f64, far: bool, size: f64| match far {
+                true => place > 1.0 - size,
+                false => place < size,
+            };
+            let hidden =
+                |(x, y): &(f64, f64)| beyond(*x, at_right, SIZE.0) && beyond(*y, upper, SIZE.1);
+            points().filter(hidden).count()
+        };
+        let least = corners
+            .into_iter()
+            .min_by_key(|(_, upper, at_right)| inside(*upper, *at_right));
+        least.map_or(SeriesLabelPosition::LowerRight, |(corner, ..)| corner)
     }
 }
 
