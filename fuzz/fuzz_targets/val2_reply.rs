@@ -2,10 +2,8 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use puma_val2::Location;
 
-fuzz_target!(|data: &[u8]| {
-    if let Some(location) = Location::parse(&String::from_utf8_lossy(data)) {
-        assert!(location.joints.0.iter().all(|angle| angle.is_finite()));
-    }
-});
+#[path = "../../crates/puma-val2/tests/it/fuzz_targets.rs"]
+mod targets;
+
+fuzz_target!(|data: &[u8]| targets::run("val2_reply", data));

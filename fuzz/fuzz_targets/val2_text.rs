@@ -2,14 +2,8 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use puma_val2::{Emulator, Profile, PumaParams};
 
-fuzz_target!(|text: &str| {
-    let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
-    if emulator.load_text(text).is_ok() {
-        let stored = emulator.text();
-        emulator
-            .load_text(&stored)
-            .expect("what was written is read");
-    }
-});
+#[path = "../../crates/puma-val2/tests/it/fuzz_targets.rs"]
+mod targets;
+
+fuzz_target!(|data: &[u8]| targets::run("val2_text", data));

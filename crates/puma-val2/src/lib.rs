@@ -109,8 +109,12 @@
 //!   28 ms before the arm slows down, so that among short motions it is ahead of the arm by the
 //!   stopping distance. How far a real controller rounds a corner is not known: here a joint uses
 //!   80 % of its acceleration for the turn, over at most half of each motion.
+//! * `DISABLE CP` and `FINE` end every motion at a stand; `COARSE`, `NULL`, `NONULL` and `INTOFF`
+//!   change nothing, since the tolerances of a real controller's servos are not known.
 //! * Motions given by `DO` never blend, and a speed set while the arm moves holds from the next
 //!   motion on.
+//! * A process-control program (`PCEXECUTE`) runs beside the robot's. It has no arm, and its `CALL`
+//!   takes no arguments; a real controller may allow more.
 //! * The supervisory port (DDCMP) and `ALTER` are missing.
 //! * A client waits until its call is done, and [`Manipulator::stop`] cannot be called meanwhile.
 //!   [`Val2Client::stop_on`] stops the arm over any line, from a fresh process too. Neither

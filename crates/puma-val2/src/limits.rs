@@ -32,26 +32,29 @@ impl JointRange {
     }
 }
 
+/// Joint speeds of the PUMA 560, degrees per second.
+pub(crate) const SPEEDS_560: [f64; 6] = [82.0, 74.0, 122.0, 228.0, 241.0, 228.0];
+
 /// Returns the classical ranges and speeds of the PUMA 560.
 pub(crate) fn puma_560() -> [JointRange; 6] {
-    [
-        (-160.0, 160.0, 82.0),
-        (-225.0, 45.0, 74.0),
-        (-45.0, 225.0, 122.0),
-        (-110.0, 170.0, 228.0),
-        (-100.0, 100.0, 241.0),
-        (-266.0, 266.0, 228.0),
-    ]
-    .map(|(min, max, speed)| in_degrees(min, max, speed))
+    let ranges = [
+        (-160.0, 160.0),
+        (-225.0, 45.0),
+        (-45.0, 225.0),
+        (-110.0, 170.0),
+        (-100.0, 100.0),
+        (-266.0, 266.0),
+    ];
+    with_speeds(ranges, SPEEDS_560)
 }
 
-/// Returns the range of a joint from degrees and degrees per second.
-pub(crate) fn in_degrees(min: f64, max: f64, speed: f64) -> JointRange {
-    JointRange {
-        min: min.to_radians(),
-        max: max.to_radians(),
-        speed: speed.to_radians(),
-    }
+/// Returns the ranges of the joints from degrees and degrees per second.
+pub(crate) fn with_speeds(ranges: [(f64, f64); 6], speeds: [f64; 6]) -> [JointRange; 6] {
+    std::array::from_fn(|i| JointRange {
+        min: ranges[i].0.to_radians(),
+        max: ranges[i].1.to_radians(),
+        speed: speeds[i].to_radians(),
+    })
 }
 
 /// Checks that every angle is finite and within its range.

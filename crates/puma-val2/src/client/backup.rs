@@ -1,9 +1,12 @@
 //! Everything in the controller's memory as text, and back.
 
+use std::collections::HashSet;
+
 use crate::client::programs::{check_line, name_of};
 use crate::client::reader::Ending;
 use crate::client::val2_client::Val2Client;
 use crate::error::ArmError;
+use crate::kinematics::xyzoat::Xyzoat;
 use crate::transport::Transport;
 
 /// Contents of a controller, or of a backup of one: names and their values, in order.
@@ -21,19 +24,17 @@ struct Body {
     /// Parameters in brackets, or nothing.
     parameters: String,
     steps: Vec<String>,
-    /// Number of the line of a text that begins the program.
-    line: usize,
+    /// Numbers of the steps' lines in a text.
+    lines: Vec<usize>,
 }
 
 impl PartialEq for Body {
     fn eq(&self, other: &Self) -> bool {
-        (&self.parameters, &self.steps) == (&other.parameters, &other.steps)
+        let mut steps = self.steps.iter().zip(&other.steps);
+        self.parameters == other.parameters
+            && self.steps.len() == other.steps.len()
+            && steps.all(|(a, b)| same_step(a, b))
     }
-}
-
-/// Name of the program of this number while the programs of a backup are typed.
-fn scratch(number: usize) -> String {
-    format!("PGN{number}")
 }
 
 impl<T: Transport> Val2Client<T> {
@@ -54,7 +55,7 @@ impl<T: Transport> Val2Client<T> {
             let body = Body {
                 parameters: head[name_of(&head).len()..].to_owned(),
                 steps,
-                line: 0,
+                lines: Vec::new(),
             };
             contents.programs.push((name, body));
         }
@@ -90,8 +91,8 @@ impl<T: Transport> Val2Client<T> {
     /// Stores the programs, locations and real variables of a backup, and compares everything with
     /// the controller's listings. What the controller holds with the same contents is left alone.
     ///
-    /// All programs are typed under other names (`PGN0` and up) before the first one is put in
-    /// place: a step that is refused leaves the controller as it was.
+    /// All programs are typed under other names (`PGN0` and up, but none of the backup's) before
+    /// the first one is put in place: a step that is refused leaves the controller as it was.
     ///
     /// # Errors
     /// [`ArmError::Text`] for a text that is no backup; [`ArmError::Conflict`] unless `replace`, if
@@ -109,10 +110,12 @@ impl<T: Transport> Val2Client<T> {
                 names: names.join(", "),
             });
         }
-        self.delete_scratch()?;
-        if let Err(error) = self.store_all(&wanted, &plan) {
+        let programs = wanted.programs.iter();
+        let names: HashSet<&str> = programs.map(|(name, _)| name.as_str()).collect();
+        self.delete_scratch(&names)?;
+        if let Err(error) = self.store_all(&wanted, &plan, &names) {
             // A line that is gone cannot take the unfinished programs away either.
-            let _ = self.delete_scratch();
+            let _ = self.delete_scratch(&names);
             return Err(error);
         }
         let missing = self.restore_plan(text)?;
@@ -123,12 +126,20 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    fn store_all(&mut self, wanted: &Contents, plan: &[String]) -> Result<(), ArmError> {
+    fn store_all(
+        &mut self,
+        wanted: &Contents,
+        plan: &[String],
+        names: &HashSet<&str>,
+    ) -> Result<(), ArmError> {
         let changes = |kind: &str, name: &str| !plan.contains(&format!("keep {kind} {name}"));
         let programs = wanted.programs.iter().filter(|p| changes("program", &p.0));
         let programs: Vec<_> = programs.collect();
-        for (i, (_, body)) in programs.iter().enumerate() {
-            let head = format!("{}{}", scratch(i), body.parameters);
+        let free = (0..).map(|i| format!("PGN{i}"));
+        let free = free.filter(|name| !names.contains(name.as_str()));
+        let scratch: Vec<String> = free.take(programs.len()).collect();
+        for ((_, body), scratch) in programs.iter().zip(&scratch) {
+            let head = format!("{scratch}{}", body.parameters);
             let typed = self.type_program(&head, &body.steps);
             typed.map_err(|error| body.located(error))?;
         }
@@ -142,8 +153,8 @@ impl<T: Transport> Val2Client<T> {
                 self.command(&format!("DO {name} = {value}"))?;
             }
         }
-        for (i, (name, _)) in programs.iter().enumerate() {
-            self.put_in_place(name, &scratch(i))?;
+        for ((name, _), scratch) in programs.iter().zip(&scratch) {
+            self.put_in_place(name, scratch)?;
         }
         Ok(())
     }
@@ -184,7 +195,7 @@ impl<T: Transport> Val2Client<T> {
         let shown = self
             .ask_point(&line)?
             .map(|shown| shown.map(|(value, _)| value));
-        let shown = shown.filter(|shown| near(shown, &stands));
+        let shown = shown.filter(|shown| near(name, shown, &stands));
         let Some(shown) = shown else {
             self.wire.settle()?;
             return Err(self
@@ -225,11 +236,28 @@ impl<T: Transport> Val2Client<T> {
     }
 }
 
-/// Returns `true` for values that differ by no more than a display does: of millimetres in
-/// hundredths, of degrees in thousandths.
-fn near(a: &[f64; 6], b: &[f64; 6]) -> bool {
-    let digit = |i: usize| if i < 3 { 0.006 } else { 0.000_6 };
-    (0..6).all(|i| (a[i] - b[i]).abs() < digit(i))
+/// Returns `true` for values of a location that differ by no more than a display does: of
+/// millimetres in hundredths, of degrees in thousandths. Angles that turn the hand into one pose
+/// are the same.
+fn near(name: &str, a: &[f64; 6], b: &[f64; 6]) -> bool {
+    let is_point = name.starts_with('#');
+    let digit = |i: usize| if i < 3 && !is_point { 0.006 } else { 0.000_6 };
+    let close = |i: usize| (a[i] - b[i]).abs() < digit(i);
+    let [one, other] = [a, b].map(|values| Xyzoat::from_val(*values).pose().rotation);
+    (0..6).all(close)
+        || !is_point && (0..3).all(close) && one.angle_to(&other).to_degrees() < 0.000_9
+}
+
+/// Returns `true` for steps that differ only in the case of their words, not of texts or remarks.
+fn same_step(a: &str, b: &str) -> bool {
+    let (mut quoted, mut remark) = (false, false);
+    let mut pairs = a.bytes().zip(b.bytes());
+    a.len() == b.len()
+        && pairs.all(|(a, b)| {
+            quoted ^= a == b'"' && !remark;
+            remark |= a == b';' && !quoted;
+            a == b || !quoted && !remark && a.eq_ignore_ascii_case(&b)
+        })
 }
 
 /// Returns a line for each name of `wanted`.
@@ -238,19 +266,20 @@ fn plan(wanted: &Contents, held: &Contents) -> Vec<String> {
         kind: &'a str,
         wanted: &'a [(String, V)],
         held: &'a [(String, V)],
-        equal: impl Fn(&V, &V) -> bool + 'a,
+        equal: impl Fn(&str, &V, &V) -> bool + 'a,
     ) -> impl Iterator<Item = String> + 'a {
         wanted.iter().map(move |(name, value)| {
             let word = match held.iter().find(|(other, _)| other == name) {
                 None => "store",
-                Some((_, other)) if equal(value, other) => "keep",
+                Some((_, other)) if equal(name, value, other) => "keep",
                 Some(_) => "replace",
             };
             format!("{word} {kind} {name}")
         })
     }
-    let real = |a: &f64, b: &f64| (a - b).abs() <= 1e-4;
-    lines("program", &wanted.programs, &held.programs, Body::eq)
+    let program = |_: &str, a: &Body, b: &Body| a == b;
+    let real = |_: &str, a: &f64, b: &f64| (a - b).abs() <= 1e-6 * a.abs();
+    lines("program", &wanted.programs, &held.programs, program)
         .chain(lines("location", &wanted.places, &held.places, near))
         .chain(lines("real", &wanted.reals, &held.reals, real))
         .collect()
@@ -288,6 +317,7 @@ impl Contents {
     fn parse(text: &str) -> Result<Self, ArmError> {
         let mut contents = Self::default();
         let mut section = String::new();
+        let mut names = HashSet::new();
         for (index, line) in text.lines().enumerate() {
             let line = line.trim();
             let upper = line.to_ascii_uppercase();
@@ -296,27 +326,36 @@ impl Contents {
                 text: line.chars().take(80).collect(),
                 problem,
             };
+            let mut once = |kind: &str, name: &str| {
+                let new = names.insert(format!("{kind} {name}"));
+                new.then_some(())
+                    .ok_or_else(|| wrong("has a name that came before"))
+            };
             if upper == ".END" && !section.is_empty() {
                 section.clear();
             } else if section == ".PROGRAM" {
-                if let Some((_, body)) = contents.programs.last_mut() {
+                if let Some((_, body)) = contents.programs.last_mut()
+                    && !line.is_empty()
+                {
                     check_line("a step of a program", line).map_err(|_| wrong("is no step"))?;
                     body.steps.push(line.to_owned());
+                    body.lines.push(index + 1);
                 }
             } else if section.is_empty() {
                 let (head, name) = upper.split_once(' ').unwrap_or((&upper, ""));
                 match (head, name.trim()) {
                     ("", _) => continue,
-                    (".PROGRAM", head) if is_head(head) => {
-                        let parameters = head[name_of(head).len()..].replace(' ', "");
-                        let body = Body {
-                            parameters: parameters.replace("()", ""),
-                            steps: Vec::new(),
-                            line: index + 1,
-                        };
-                        contents.programs.push((name_of(head).to_owned(), body));
-                    }
                     (".LOCATIONS" | ".REALS", "") => {}
+                    (".PROGRAM", head) => {
+                        let named = split_head(head);
+                        let (name, parameters) = named.ok_or_else(|| wrong("names no program"))?;
+                        once(".PROGRAM", &name)?;
+                        let body = Body {
+                            parameters,
+                            ..Body::default()
+                        };
+                        contents.programs.push((name, body));
+                    }
                     _ => return Err(wrong("begins no program, locations or reals")),
                 }
                 head.clone_into(&mut section);
@@ -325,12 +364,14 @@ impl Contents {
                 let values: Option<Vec<f64>> = values.split(',').map(number).collect();
                 let values = values.unwrap_or_default();
                 if section == ".REALS" && is_name(name) && values.len() == 1 {
+                    once(".REALS", name)?;
                     contents.reals.push((name.to_owned(), values[0]));
                     continue;
                 }
                 let plain = name.strip_prefix('#').unwrap_or(name);
                 match values.try_into() {
                     Ok(values) if section == ".LOCATIONS" && is_name(plain) => {
+                        once(".LOCATIONS", name)?;
                         contents.places.push((name.to_owned(), values));
                     }
                     _ => return Err(wrong("is no name with its value or six values")),
@@ -367,12 +408,29 @@ impl Body {
         let unknown = message.to_ascii_uppercase().contains("INSTRUCTION");
         ArmError::Step {
             port: port.clone(),
-            line: self.line + 1 + at,
+            line: self.lines.get(at).copied().unwrap_or_default(),
             step: sent.clone(),
             word: first.filter(|_| unknown).map(str::to_owned),
             message: message.clone(),
         }
     }
+}
+
+/// Splits the head of a program into its name and its parameters; empty brackets are left out.
+fn split_head(head: &str) -> Option<(String, String)> {
+    let (name, parameters) = head.split_at(head.find('(').unwrap_or(head.len()));
+    let inner = parameters.strip_prefix('(');
+    let names: Vec<&str> = match inner.map(|list| list.strip_suffix(')')) {
+        None => Vec::new(),
+        Some(list) => list?.split(',').map(str::trim).collect(),
+    };
+    let is_named = |name: &&str| is_name(name.strip_prefix('#').unwrap_or(name));
+    let (name, parameters) = match names[..] {
+        [] | [""] => (name.trim(), String::new()),
+        _ if names.iter().all(is_named) => (name.trim(), format!("({})", names.join(","))),
+        _ => return None,
+    };
+    is_name(name).then(|| (name.to_owned(), parameters))
 }
 
 /// Parses a finite number; words are refused.
@@ -381,18 +439,13 @@ fn number(text: &str) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-/// Returns `true` for the name of a program, location or variable, possibly with an index.
+/// Returns `true` for the name of a program, location or variable, possibly with indices.
 fn is_name(name: &str) -> bool {
-    let letter = |c: char| c.is_ascii_alphanumeric() || "._[]".contains(c);
-    name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(letter)
-}
-
-/// Returns `true` for the name of a program, possibly with names in brackets.
-fn is_head(head: &str) -> bool {
-    let Some((name, parameters)) = head.split_once('(') else {
-        return is_name(head);
-    };
-    let parameters = parameters.strip_suffix(')').map(str::trim);
-    is_name(name.trim())
-        && parameters.is_some_and(|p| p.is_empty() || p.split(',').all(|p| is_name(p.trim())))
+    let (plain, indices) = name.split_at(name.find('[').unwrap_or(name.len()));
+    let letter = |c: char| c.is_ascii_alphanumeric() || "._".contains(c);
+    let inner = indices.strip_prefix('[').and_then(|i| i.strip_suffix(']'));
+    let sound = |all: &str| all.split(',').all(|index| index.parse::<u16>().is_ok());
+    plain.starts_with(|c: char| c.is_ascii_alphabetic())
+        && plain.chars().all(letter)
+        && (indices.is_empty() || inner.is_some_and(sound))
 }

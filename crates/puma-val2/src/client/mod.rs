@@ -1,6 +1,6 @@
 //! The client: typed calls to a VAL II controller over any line.
 
-mod backup;
+pub(crate) mod backup;
 pub(crate) mod config;
 pub(crate) mod connect;
 mod dialogue;

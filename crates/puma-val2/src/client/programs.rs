@@ -1,5 +1,6 @@
 //! Programs on the controller: typed, listed, run.
 
+use std::collections::HashSet;
 use std::time::Duration;
 
 use crate::client::dialogue::Mode;
@@ -82,11 +83,11 @@ impl<T: Transport> Val2Client<T> {
     }
 
     /// Returns the head of a program, its name and its parameters in brackets, and its steps.
-    pub(super) fn listed(&mut self, name: &str) -> Result<(String, Vec<String>), ArmError> {
+    pub(crate) fn listed(&mut self, name: &str) -> Result<(String, Vec<String>), ArmError> {
         check_line("the name of a program", name)?;
         let lines = self.listing(&format!("LISTP {name}"))?;
         let head = lines.iter().find_map(|line| line.strip_prefix(".PROGRAM "));
-        let head = head.unwrap_or(name).trim().to_ascii_uppercase();
+        let head = without_blanks(&head.unwrap_or(name).to_ascii_uppercase());
         // `.PROGRAM NAME` and `.END` are not steps.
         let steps = lines.iter().filter(|line| !line.starts_with('.'));
         let steps = steps.map(|line| without_number(line).to_owned());
@@ -94,7 +95,8 @@ impl<T: Transport> Val2Client<T> {
     }
 
     /// Stores a program. One of the same name is replaced, but only after the new one has been
-    /// typed under another name (`PGNEW`), listed and compared.
+    /// typed under another name (`PGNEW`), listed and compared. Parameters of the program follow
+    /// its name in brackets.
     ///
     /// # Errors
     /// [`ArmError::Setting`], before anything is sent, for a name or a step that is not one line of
@@ -106,12 +108,14 @@ impl<T: Transport> Val2Client<T> {
         for step in steps {
             check_line("a step of a program", step)?;
         }
-        if let Err(error) = self.type_program(NEW, steps) {
+        let bare = name_of(name);
+        let head = name.replacen(bare, NEW, 1);
+        if let Err(error) = self.type_program(&head, steps) {
             // A line that is gone cannot take the unfinished program away either.
-            let _ = self.delete_scratch();
+            let _ = self.delete_scratch(&HashSet::new());
             return Err(error);
         }
-        self.put_in_place(name, NEW)
+        self.put_in_place(bare, NEW)
     }
 
     /// Renames the program `new` to `name`, replacing the old program of that name. At every moment
@@ -146,8 +150,8 @@ impl<T: Transport> Val2Client<T> {
         deleted
     }
 
-    /// Deletes the programs that were being typed when a call failed.
-    pub(super) fn delete_scratch(&mut self) -> Result<(), ArmError> {
+    /// Deletes the programs that were being typed when a call failed, but none of `spared`.
+    pub(super) fn delete_scratch(&mut self, spared: &HashSet<&str>) -> Result<(), ArmError> {
         self.wire.settle()?;
         // Not by a listing, which may take half an hour.
         let reply = self.say("DIRECTORY")?;
@@ -155,7 +159,8 @@ impl<T: Transport> Val2Client<T> {
         let lines = lines_said(&reply.text, "DIRECTORY");
         for name in lines.iter().flat_map(|line| line.split_whitespace()) {
             let number = name.strip_prefix("PGN");
-            if name == NEW || number.is_some_and(|n| n.parse::<u32>().is_ok()) {
+            let is_scratch = name == NEW || number.is_some_and(|n| n.parse::<u32>().is_ok());
+            if is_scratch && !spared.contains(name) {
                 self.delete('P', name)?;
             }
         }
@@ -233,7 +238,8 @@ impl<T: Transport> Val2Client<T> {
         self.say("E")?;
         let listed = self.say(&format!("LISTP {name}"))?.text;
         let listed = listed.to_ascii_uppercase();
-        if holds(&listed, steps) && (name == head || listed.contains(head)) {
+        let has_head = without_blanks(&listed).contains(&without_blanks(head).to_uppercase());
+        if has_head && holds(&listed, steps) {
             return Ok(());
         }
         Err(self
@@ -311,6 +317,10 @@ pub(super) fn check_line(what: &'static str, text: &str) -> Result<(), ArmError>
     })
 }
 
+fn without_blanks(text: &str) -> String {
+    text.split_whitespace().collect()
+}
+
 /// Returns the name in the head of a program.
 pub(super) fn name_of(head: &str) -> &str {
     head.split('(').next().unwrap_or_default().trim()
@@ -328,7 +338,8 @@ fn without_number(line: &str) -> &str {
 
 /// Returns `true` if a listing shows exactly these steps in their order.
 fn holds(listing: &str, steps: &[String]) -> bool {
-    let steps: Vec<String> = steps.iter().map(|step| step.to_ascii_uppercase()).collect();
+    let steps = steps.iter().map(|step| step.trim().to_ascii_uppercase());
+    let steps: Vec<String> = steps.collect();
     let shown: Vec<&str> = listing
         .split(['\r', '\n'])
         .map(str::trim)

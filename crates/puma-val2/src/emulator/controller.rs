@@ -97,6 +97,9 @@ pub struct Emulator {
     pub(super) job: Option<Job>,
     /// Job that `PROCEED` and `RETRY` continue.
     pub(super) paused: Option<Job>,
+    /// Process-control program that runs beside the job, and one that `PCPROCEED` continues.
+    pub(super) process: Option<Job>,
+    pub(super) process_paused: Option<Job>,
     pub(super) reactions: Vec<Reaction>,
     /// Program that `REACTE` calls after a fault.
     pub(super) on_fault: Option<String>,
@@ -138,6 +141,8 @@ impl Emulator {
             signals: Signals::default(),
             job: None,
             paused: None,
+            process: None,
+            process_paused: None,
             reactions: Vec::new(),
             on_fault: None,
             sensors: Vec::new(),
@@ -203,13 +208,14 @@ impl Emulator {
     fn next_step(&self) -> Option<Duration> {
         let line = (self.terminal.has_line() && self.takes_lines()).then_some(self.monitor_ready);
         let tick = (self.arm.moving() && self.watches()).then_some(self.next_tick);
-        let job = self.job.as_ref().and_then(|job| self.job_due(job));
+        let due = |job: &Option<Job>| job.as_ref().and_then(|job| self.job_due(job));
         [
             self.terminal.next_arrival(),
             self.arm.motion_end(),
             line,
             tick,
-            job,
+            due(&self.job),
+            due(&self.process),
         ]
         .into_iter()
         .flatten()
@@ -242,6 +248,7 @@ impl Emulator {
             self.line(&line);
         }
         self.run_job();
+        self.run_process();
     }
 
     /// Returns `true` if sensors or reactions have to be looked at while the arm moves.
@@ -335,6 +342,8 @@ impl Emulator {
         self.terminal = Terminal::new();
         self.job = None;
         self.paused = None;
+        self.process = None;
+        self.process_paused = None;
         self.reactions.clear();
         self.panel_used = false;
         self.terminal.print(self.profile.eol, self.now);

@@ -59,18 +59,29 @@ impl PumaParams {
         }
     }
 
-    /// Returns the lengths of a course model of the PUMA 260 (203.2, 0, 127.0, 203.2, 63.5 mm).
-    /// Other models have 124.5 mm for the lateral offset and 55.9 mm for the flange.
+    /// Returns the lengths of a course model of the PUMA 260 (203.2, 0, 127.0, 203.2, 63.5 mm), and
+    /// the ranges of the General Robotics Toolbox, which calls its model approximate (-159..159,
+    /// -256..76, -34..214, -289..289, -122..122, -267..267 degrees). Other models have 124.5 mm for
+    /// the lateral offset and 55.9 mm for the flange. Of joints 1, 4 and 6 only the width of the
+    /// range is known: it is laid evenly about zero.
     ///
-    /// No source gives the ranges in VAL's angles, or the speeds: take them from your arm.
-    pub fn puma_260(ranges: [JointRange; 6]) -> Self {
+    /// No source gives the joint speeds, degrees per second: take them from your arm.
+    pub fn puma_260(speeds: [f64; 6]) -> Self {
+        let ranges = [
+            (-159.0, 159.0),
+            (-256.0, 76.0),
+            (-34.0, 214.0),
+            (-289.0, 289.0),
+            (-122.0, 122.0),
+            (-267.0, 267.0),
+        ];
         Self {
             a2: 0.2032,
             a3: 0.0,
             d2: 0.127,
             d4: 0.2032,
             d6: 0.0635,
-            ranges,
+            ranges: limits::with_speeds(ranges, speeds),
         }
     }
 
@@ -94,9 +105,19 @@ impl PumaParams {
             d2: 0.19,
             d4: 0.6,
             d6: 0.0,
-            ranges: std::array::from_fn(|i| {
-                limits::in_degrees(ranges[i].0, ranges[i].1, speeds[i])
-            }),
+            ranges: limits::with_speeds(ranges, speeds),
+        }
+    }
+
+    /// Returns the arm of this number: `260`, `560` or `762`. The speeds of all are those of the
+    /// 560, since none are known of the others.
+    #[cfg(feature = "cli")]
+    pub(crate) fn numbered(number: &str) -> Option<Self> {
+        match number {
+            "260" => Some(Self::puma_260(limits::SPEEDS_560)),
+            "560" => Some(Self::unimation()),
+            "762" => Some(Self::puma_762(limits::SPEEDS_560)),
+            _ => None,
         }
     }
 

@@ -194,9 +194,9 @@ pub(super) fn run(
         }
         Command::Ls => list(globals, &mut client)?,
         Command::Get { name } => {
-            let steps = client.program(name)?;
+            let (head, steps) = client.listed(name)?;
             let body: String = steps.iter().map(|step| format!(" {step}\n")).collect();
-            let text = format!(".PROGRAM {}\n{body}.END", name.to_ascii_uppercase());
+            let text = format!(".PROGRAM {head}\n{body}.END");
             print(globals, &text, &json!({"program": name, "steps": steps}))?;
         }
         Command::Put { file }

@@ -28,7 +28,11 @@ pub(super) struct Options {
     /// Make this symbolic link to the pseudo-terminal.
     #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
     link: Option<PathBuf>,
-    /// Behaviour of the controller: val2, val2_strict_miz, val2_hardware.
+    /// Arm: 260, 560 or 762. Lengths and ranges of the 260 and 762 are those of public models; the
+    /// speeds of all are those of the 560.
+    #[arg(long, value_name = "NUMBER", default_value = "560", value_parser = ["260", "560", "762"])]
+    arm: String,
+    /// Behaviour of the controller: val2, val2_strict_miz, val2_hardware, val.
     #[arg(long, value_name = "NAME", default_value = "val2")]
     profile: String,
     /// Let motions take their time. Otherwise the controller's clock jumps ahead whenever it waits
@@ -55,7 +59,13 @@ pub(super) fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     if let Some(baud) = options.baud {
         profile.baud = Some(baud);
     }
-    let mut emulator = Emulator::new(PumaParams::unimation(), profile);
+    let arm = PumaParams::numbered(&options.arm).unwrap_or_else(PumaParams::unimation);
+    profile.banner = profile.banner.replace("560", &options.arm);
+    // The pose of NEST is an assumption for the 560; another arm folds as far as it can.
+    for (angle, range) in profile.nest.0.iter_mut().zip(arm.ranges) {
+        *angle = angle.clamp(range.min, range.max);
+    }
+    let mut emulator = Emulator::new(arm, profile);
     let floppy = match &options.floppy {
         Some(folder) => Some(Floppy::insert(folder, &mut emulator)?),
         None => None,

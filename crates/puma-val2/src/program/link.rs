@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use crate::client::{ClientConfig, MoveWay, Val2Client};
 use crate::emulator::profile::Profile;
+use crate::kinematics::params::PumaParams;
 use crate::program::failure::Failure;
 use crate::program::{Command, Globals, commands, term};
 use crate::transport::{Recorded, SerialLine, TcpLine, Transport};
@@ -96,7 +97,9 @@ fn config(globals: &Globals) -> Result<ClientConfig, Failure> {
         Failure::usage(format!("no profile `{name}`: there are {names}"))
     })?;
     let usual = ClientConfig::for_baud(globals.baud.unwrap_or(9600));
+    let arm = globals.arm.as_deref().unwrap_or("560");
     Ok(ClientConfig {
+        params: PumaParams::numbered(arm).unwrap_or_else(PumaParams::unimation),
         // Half of what a program of its own may wait.
         connect_timeout: usual.connect_timeout / 2,
         control_characters: profile.control_characters,

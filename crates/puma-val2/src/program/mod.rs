@@ -48,8 +48,11 @@ struct Globals {
     /// Speed of the line [default: 9600].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(50..))]
     baud: Option<u32>,
-    /// Abilities of the controller: val2 (the default), val2_hardware, or val2_strict_miz, which
-    /// knows neither control characters nor #PPOINT.
+    /// Arm, whose ranges are checked before a move: 260, 560 (the default) or 762.
+    #[arg(long, value_name = "NUMBER", value_parser = ["260", "560", "762"])]
+    arm: Option<String>,
+    /// Abilities of the controller: val2 (the default), val2_hardware, val, or val2_strict_miz,
+    /// which knows neither control characters nor #PPOINT.
     #[arg(long, value_name = "NAME")]
     profile: Option<String>,
     /// Write what passes on the line to this file.
@@ -239,6 +242,7 @@ impl Globals {
             ("--port", self.port.is_some()),
             ("--tcp", self.tcp.is_some()),
             ("--baud", self.baud.is_some()),
+            ("--arm", self.arm.is_some()),
             ("--profile", self.profile.is_some()),
             ("--transcript", self.transcript.is_some()),
             ("--json", self.json),

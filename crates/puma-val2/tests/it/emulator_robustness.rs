@@ -4,6 +4,10 @@ use std::time::Duration;
 
 use proptest::prelude::*;
 use puma_val2::{Emulator, Location, Profile, PumaParams};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+
+use crate::fuzz_targets::{TARGETS, run};
 
 /// Pieces of VAL II in which chance finds more than in bytes.
 const WORDS: &str = r#"
@@ -25,20 +29,6 @@ proptest! {
         failure_persistence: None,
         ..ProptestConfig::default()
     })]
-
-    #[test]
-    fn the_controller_takes_any_bytes(
-        bytes in prop::collection::vec(any::<u8>(), 0..2000),
-        step in 0_u64..5000,
-    ) {
-        let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
-        let mut now = Duration::ZERO;
-        for chunk in bytes.chunks(37) {
-            now += Duration::from_millis(step);
-            let said = emulator.feed(chunk, now);
-            prop_assert!(said.len() < 1 << 20);
-        }
-    }
 
     #[test]
     fn the_controller_takes_any_lines(
@@ -67,15 +57,6 @@ proptest! {
     }
 
     #[test]
-    fn texts_of_any_kind_are_refused_or_taken(
-        text in "(\\.PROGRAM A\n|\\.END\n|\\.REALS\n|\\.LOCATIONS\n|P 1,2,3,4,5,6\n|N 3\n|\
-            [ -~]{0,20}\n){0,20}",
-    ) {
-        let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
-        let _ = emulator.load_text(&text);
-    }
-
-    #[test]
     fn where_is_read_from_any_numbers(
         values in prop::array::uniform12(-1000.0_f64..1000.0),
         width in 0_usize..12,
@@ -93,5 +74,51 @@ proptest! {
         for (read, sent) in location.hand.val().iter().zip(&values[..6]) {
             prop_assert!((read - sent).abs() < 0.001);
         }
+    }
+}
+
+const SIGNS: &[u8] = b"\r\n .,;:#()[]=-0159\"EAPS";
+
+/// Changes, doubles, leaves out or moves some bytes of a text.
+fn mutated(rng: &mut StdRng, texts: &[&str]) -> Vec<u8> {
+    let mut bytes = texts[rng.random_range(0..texts.len())].as_bytes().to_vec();
+    for _ in 0..rng.random_range(1..8) {
+        let at = rng.random_range(0..=bytes.len());
+        let end = (at + rng.random_range(1..24)).min(bytes.len());
+        let piece = bytes[at..end].to_vec();
+        let to = rng.random_range(0..=bytes.len());
+        match rng.random_range(0..5) {
+            0 => drop(bytes.drain(at..end)),
+            1 => drop(bytes.splice(to..to, piece)),
+            2 => bytes.insert(at, rng.random()),
+            3 => bytes.insert(at, SIGNS[rng.random_range(0..SIGNS.len())]),
+            _ if at < end => bytes[at] ^= 1 << rng.random_range(0..8),
+            _ => {}
+        }
+    }
+    bytes
+}
+
+/// The number of inputs of each target is `PUMA_VAL2_FUZZ` (default 150). Their first texts are
+/// written to folders of the folder `PUMA_VAL2_SEEDS`, if it is given, for `cargo fuzz`.
+#[test]
+fn fuzz_targets_take_damaged_texts() {
+    let inputs = std::env::var("PUMA_VAL2_FUZZ").map_or(150, |n| n.parse().unwrap());
+    let seeds = std::env::var_os("PUMA_VAL2_SEEDS");
+    for (name, _, texts) in TARGETS {
+        for (i, text) in texts.iter().enumerate() {
+            run(name, text.as_bytes());
+            if let Some(folder) = &seeds {
+                let folder = std::path::Path::new(folder).join(name);
+                std::fs::create_dir_all(&folder).unwrap();
+                std::fs::write(folder.join(i.to_string()), text).unwrap();
+            }
+        }
+        let mut rng = StdRng::seed_from_u64(16);
+        let start = std::time::Instant::now();
+        for _ in 0..inputs {
+            run(name, &mutated(&mut rng, texts));
+        }
+        println!("{name}: {inputs} inputs in {:.1?}", start.elapsed());
     }
 }

@@ -28,6 +28,7 @@ mod console;
 mod emulator_robustness;
 mod faults;
 mod forms;
+mod fuzz_targets;
 mod interpreter;
 mod oracles;
 #[cfg(all(unix, feature = "cli"))]

@@ -195,10 +195,9 @@ fn an_independent_inverse_finds_the_same_solutions() {
     use rs_opw_kinematics::parameters::opw_kinematics::Parameters;
 
     let mut random = Xoshiro256PlusPlus::seed_from_u64(560);
-    let ranges = PumaParams::unimation().ranges;
     let arms = [
         ("560", PumaParams::corke()),
-        ("260", PumaParams::puma_260(ranges)),
+        ("260", PumaParams::puma_260([90.0; 6])),
         ("762", PumaParams::puma_762([90.0; 6])),
     ];
     for (name, arm) in arms {

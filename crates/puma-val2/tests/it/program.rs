@@ -165,3 +165,35 @@ fn what_cannot_be_served_on_is_named() {
         );
     }
 }
+
+#[test]
+fn the_arm_can_be_chosen() {
+    for (number, reach) in [("260", 469.9), ("560", 921.12), ("762", 1250.0)] {
+        let mut command = emulate(&["--tcp", "127.0.0.1:0", "--arm", number]);
+        let (emulator, address, _) = listening(&mut command);
+        let line = TcpStream::connect(address).unwrap();
+        line.set_read_timeout(Some(Duration::from_secs(20)))
+            .unwrap();
+        let mut terminal = Terminal { emulator, line };
+        terminal.read_until("? ");
+        terminal.say("N", "? ");
+        assert!(
+            terminal
+                .say("N", "\r\n.")
+                .contains(&format!("PUMA {number}"))
+        );
+        // Straight up, the hand is as high as the arm is long.
+        assert!(
+            terminal
+                .say("WHERE", "\r\n.")
+                .contains(&format!("{reach:9.2}")),
+            "{number}"
+        );
+        terminal.say("CAL", "? ");
+        terminal.say("Y", "\r\n.");
+        assert!(!terminal.say("DO NEST", "\r\n.").contains('*'), "{number}");
+        terminal.quit();
+    }
+    let outcome = emulate(&["--arm", "761"]).output().unwrap();
+    assert!(String::from_utf8_lossy(&outcome.stderr).contains("possible values: 260, 560, 762"));
+}

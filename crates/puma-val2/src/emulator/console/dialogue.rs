@@ -235,6 +235,8 @@ impl Emulator {
     fn forget_everything(&mut self) {
         self.memory = Memory::default();
         self.paused = None;
+        self.process = None;
+        self.process_paused = None;
         self.reactions.clear();
     }
 

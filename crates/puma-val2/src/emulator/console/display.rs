@@ -30,6 +30,39 @@ pub(crate) fn plain(value: f64) -> String {
     }
 }
 
+/// Formats a real with all its digits, for `LISTR`.
+pub(crate) fn exact(value: f64) -> String {
+    match value.abs() {
+        0.0 => "0".into(),
+        size if (1e-4..1e15).contains(&size) => value.to_string(),
+        _ => format!("{value:e}"),
+    }
+}
+
+/// Rounds the angles of a pose to the digits of the display. An angle of -180 degrees is one of
+/// 180, and where the tool axis is shown as vertical the whole turn about it is O: what is shown is
+/// shown again when it is typed.
+fn rounded(values: [f64; 6], profile: &Profile) -> [f64; 6] {
+    let digits = 10_f64.powi(profile.angle_decimals.min(9) as i32);
+    let [x, y, z, o, a, t] = values;
+    let is_vertical = (90.0 - a.abs()) * digits <= 0.5;
+    // A pose whose tool axis is vertical to the last bit.
+    let upright = |a: f64| Xyzoat::from_pose(&Xyzoat::from_val([0.0, 0.0, 0.0, o, a, t]).pose());
+    let (o, t) = if is_vertical {
+        (upright(90.0_f64.copysign(a)).o.to_degrees(), 0.0)
+    } else {
+        (o, t)
+    };
+    let turn = |v: f64| {
+        if (v * digits).round() <= -180.0 * digits {
+            v + 360.0
+        } else {
+            v
+        }
+    };
+    [x, y, z, turn(o), a, turn(t)]
+}
+
 /// Places a word over the middle of a column of numbers.
 fn above(word: &str, width: usize) -> String {
     let before = (width.saturating_sub(word.len()) + 2) / 2;
@@ -47,7 +80,7 @@ pub(crate) fn whereabouts(
     let width = profile.width;
     let heading = |words: [String; 6]| words.map(|w| above(&w, width)).concat();
     let mut cartesian_heading = heading(["X", "Y", "Z", "O", "A", "T"].map(String::from));
-    let values = hand.val();
+    let values = rounded(hand.val(), profile);
     let mut cartesian: String = (0..6)
         .map(|i| {
             let decimals = if i < 3 {
@@ -89,8 +122,12 @@ pub(crate) fn place_heading(profile: &Profile) -> String {
 
 /// Returns the six values of a location, to be printed below [`place_heading`].
 pub(crate) fn place_values(place: &Place, profile: &Profile) -> String {
-    let values = place.val();
     let lengths = matches!(place, Place::Transformation(_));
+    let values = if lengths {
+        rounded(place.val(), profile)
+    } else {
+        place.val()
+    };
     (0..6)
         .map(|i| {
             let decimals = if lengths && i < 3 {

@@ -92,8 +92,11 @@ impl Emulator {
     pub(crate) fn edit_line(&mut self, mut editing: Editing, line: &str) {
         let text = line.trim().to_ascii_uppercase();
         let mut words = text.split_whitespace();
-        let command = words.next().unwrap_or_default();
-        let argument = words.next().map(str::parse::<usize>);
+        let (command, next) = (words.next().unwrap_or_default(), words.next());
+        // `C = 3` is a step, an assignment to C.
+        let assigns = next.is_some_and(|word| word.starts_with(['=', '[']));
+        let command = if assigns { "=" } else { command };
+        let argument = next.map(str::parse::<usize>);
         let count = match argument {
             None => Some(1),
             Some(Ok(number)) => Some(number.min(self.profile.max_entries)),

@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 
 use crate::emulator::console::mode::Kind;
 use crate::emulator::controller::{Emulator, Event};
-use crate::emulator::language::lexer::{Cursor, tokens};
+use crate::emulator::language::lexer::{Cursor, GREATEST, tokens};
 use crate::emulator::language::place::Place;
 use crate::emulator::language::place_expr::PlaceName;
 use crate::emulator::language::program::{Program, Step};
@@ -30,14 +30,23 @@ use crate::kinematics::xyzoat::Xyzoat;
 
 /// Error in a text of programs, locations and variables.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("line {line}: {fault}: {text}")]
+#[error("line {line}: {fault}{}: {text}", in_quotes(word))]
 pub struct TextError {
     /// Number of the line, from 1.
     pub line: usize,
     /// Fault of the line.
     pub fault: Fault,
+    /// First word of the line that is not understood; empty if the fault is none of one word.
+    pub word: String,
     /// Text of the line.
     pub text: String,
+}
+
+fn in_quotes(word: &str) -> String {
+    match word {
+        "" => String::new(),
+        word => format!(" `{word}`"),
+    }
 }
 
 impl Emulator {
@@ -108,8 +117,13 @@ impl Emulator {
         let file = cursor.name()?;
         cursor.expect_end()?;
         let text = self.floppy.get(&file).ok_or(Message::File)?;
-        self.memory =
-            parsed(text, kind, self.memory.clone(), &self.profile).map_err(|error| error.fault)?;
+        match parsed(text, kind, self.memory.clone(), &self.profile) {
+            Ok(memory) => self.memory = memory,
+            Err(error) => {
+                self.print_line(&format!("Line {}: {}", error.line, error.text));
+                return Err(error.fault);
+            }
+        }
         Ok(())
     }
 }
@@ -170,12 +184,14 @@ fn parsed(
 ) -> Result<Memory, TextError> {
     let mut section = Section::None;
     for (index, line) in text.lines().enumerate() {
-        take_line(line.trim(), &mut section, kind, &mut memory, profile).map_err(|fault| {
-            TextError {
-                line: index + 1,
-                fault,
-                text: line.chars().take(80).collect(),
-            }
+        let line = line.trim();
+        let mut word = String::new();
+        let taken = take_line(line, &mut section, kind, &mut memory, profile, &mut word);
+        taken.map_err(|fault| TextError {
+            line: index + 1,
+            fault,
+            word,
+            text: line.chars().take(80).collect(),
         })?;
     }
     match section {
@@ -183,6 +199,7 @@ fn parsed(
         _ => Err(TextError {
             line: text.lines().count(),
             fault: Message::ControlStructure.into(),
+            word: String::new(),
             text: "the section is not closed by .END".into(),
         }),
     }
@@ -197,6 +214,7 @@ fn take_line(
     kind: Option<Kind>,
     memory: &mut Memory,
     profile: &Profile,
+    unknown: &mut String,
 ) -> Result<(), Fault> {
     let wanted = |k: Kind| kind.is_none_or(|kind| kind == k);
     let limit = match section {
@@ -233,11 +251,17 @@ fn take_line(
                 memory.set_program(name, program, profile)?;
             }
         }
+        // A line without a step: the editor takes none either.
+        Section::Program(..) if words.is_empty() => {}
         Section::Program(_, program) => {
             if program.steps.len() >= profile.max_entries {
                 return Err(Message::OutOfMemory.into());
             }
-            program.steps.push(Step::parse(line, profile.first_val)?);
+            let step = Step::parse_or_word(line, profile.first_val);
+            program.steps.push(step.map_err(|(fault, word)| {
+                *unknown = word;
+                fault
+            })?);
         }
         Section::Locations => {
             let [name, values] = words[..] else {
@@ -274,17 +298,17 @@ fn number(text: &str) -> Result<f64, Fault> {
         .all(|b| b.is_ascii_digit() || b"+-.E".contains(&b.to_ascii_uppercase()));
     let value = plain.then(|| text.parse::<f64>().ok()).flatten();
     value
-        .filter(|v| v.is_finite())
+        .filter(|v| v.abs() <= GREATEST)
         .ok_or(Message::InvalidArgument.into())
 }
 
-/// Checks a name, possibly with an index.
+/// Checks a name, possibly with indices.
 fn sound_name(name: &str, profile: &Profile) -> Result<String, Fault> {
     let plain = match name.split_once('[') {
         Some((plain, index))
             if index
                 .strip_suffix(']')
-                .is_some_and(|i| i.parse::<u16>().is_ok()) =>
+                .is_some_and(|all| all.split(',').all(|i| i.parse::<u16>().is_ok())) =>
         {
             plain
         }

@@ -8,6 +8,7 @@ use crate::emulator::console::editor::numbered;
 use crate::emulator::controller::Emulator;
 use crate::emulator::language::place::Place;
 use crate::emulator::language::program::Program;
+use crate::emulator::machine::job::Job;
 use crate::emulator::machine::signals::BANKS;
 use crate::emulator::message::{Fault, Message};
 use crate::kinematics::xyzoat::Xyzoat;
@@ -35,7 +36,7 @@ impl Emulator {
     }
 
     pub(crate) fn real_lines(&self, names: &[String]) -> Result<Vec<String>, Fault> {
-        let line = |name: &String, value: &f64| format!("{name:<16}{}", display::plain(*value));
+        let line = |name: &String, value: &f64| format!("{name:<15} {}", display::exact(*value));
         named(&self.memory.reals, names, Message::UndefinedValue, line)
     }
 
@@ -100,21 +101,29 @@ impl Emulator {
             ),
         ];
         let job = self.job.as_ref().filter(|job| job.is_program());
-        match job.and_then(|job| job.at().map(|at| (job, at))) {
-            Some((job, (name, step))) => {
-                lines.push(format!("PROGRAM {name}  STEP {step}"));
-                lines.push(match job.cycles_left() {
-                    Some(left) => format!("CYCLES LEFT {left}"),
-                    None => "CYCLES LEFT FOREVER".into(),
-                });
-                if job.waits() {
-                    lines.push("WAITING".into());
-                }
-            }
-            None => lines.push("NO PROGRAM EXECUTING".into()),
-        }
+        lines.extend(job_lines(job, "PROGRAM"));
         lines
     }
+
+    pub(crate) fn process_lines(&self) -> Vec<String> {
+        job_lines(self.process.as_ref(), "PROCESS PROGRAM")
+    }
+}
+
+/// Returns what a running program does.
+fn job_lines(job: Option<&Job>, what: &str) -> Vec<String> {
+    let Some((job, (name, step))) = job.and_then(|job| Some((job, job.at()?))) else {
+        return vec![format!("NO {what} EXECUTING")];
+    };
+    let left = job.cycles_left.map(|left| left.to_string());
+    let mut lines = vec![
+        format!("{what} {name}  STEP {step}"),
+        format!("CYCLES LEFT {}", left.unwrap_or("FOREVER".into())),
+    ];
+    if job.waits() {
+        lines.push("WAITING".into());
+    }
+    lines
 }
 
 /// Returns a line about each of the names, or about everything.

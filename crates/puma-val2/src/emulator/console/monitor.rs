@@ -30,7 +30,7 @@ enum Work {
 use Work::{Asks, Does, List, Show};
 
 /// Commands; `true` for those that may be given while a program runs.
-const COMMANDS: [(&str, (bool, Work)); 51] = [
+const COMMANDS: [(&str, (bool, Work)); 57] = [
     ("ABORT", (true, Asks(|e, c| e.abort(c, false)))),
     ("BASE", (false, Does(Emulator::base))),
     ("CALIBRATE", (false, Asks(Emulator::ask_calibration))),
@@ -81,6 +81,7 @@ const COMMANDS: [(&str, (bool, Work)); 51] = [
         (false, Asks(|e, c| e.ask_sure(c, Confirm::Format))),
     ),
     ("HERE", (true, Asks(Emulator::here_dialogue))),
+    ("ID", (true, Show(|e| vec![e.profile.banner.clone()]))),
     ("IO", (true, Show(Emulator::signal_lines))),
     ("LISTL", (true, List(Emulator::location_lines))),
     ("LISTP", (true, List(Emulator::program_lines))),
@@ -94,6 +95,11 @@ const COMMANDS: [(&str, (bool, Work)); 51] = [
         (false, Does(|e, c| e.resume_program(c, false, true))),
     ),
     ("PANIC", (true, Asks(|e, c| e.abort(c, true)))),
+    ("PCABORT", (true, Does(Emulator::abort_process))),
+    ("PCEND", (true, Does(Emulator::end_process_cycle))),
+    ("PCEXECUTE", (true, Does(Emulator::execute_process))),
+    ("PCPROCEED", (true, Does(Emulator::proceed_process))),
+    ("PCSTATUS", (true, Show(Emulator::process_lines))),
     ("POINT", (false, Asks(Emulator::point))),
     (
         "PROCEED",
@@ -209,9 +215,9 @@ impl Emulator {
 
     /// Carries out `HERE name`, which shows the location and asks for changes.
     fn here_dialogue(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
-        let name = PlaceName::parse(cursor)?;
+        let names = PlaceName::parse_compound(cursor)?;
         cursor.expect_end()?;
-        let (key, place) = (name.key(&self.scope())?, self.here(name.precision));
+        let (key, place) = self.taught(&names)?;
         self.memory.set_place(key.clone(), place, &self.profile)?;
         self.ask_change(key, place);
         Ok(())
@@ -219,9 +225,9 @@ impl Emulator {
 
     /// Carries out `TEACH name`: the location is where the arm stands, without a dialogue.
     pub(crate) fn teach(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
-        let name = PlaceName::parse(cursor)?;
+        let names = PlaceName::parse_compound(cursor)?;
         cursor.expect_end()?;
-        let (key, place) = (name.key(&self.scope())?, self.here(name.precision));
+        let (key, place) = self.taught(&names)?;
         self.memory.set_place(key, place, &self.profile)
     }
 
@@ -354,15 +360,16 @@ impl Emulator {
         Ok(())
     }
 
-    /// Carries out `EXECUTE [program][,cycles][,step]`. Negative cycles run for ever; no name means
-    /// the program executed last.
-    fn execute(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+    /// Parses `[program][,cycles][,step]`: the name, the cycles or `None` for ever, and the index
+    /// of the step. Negative cycles run for ever; no name means `last`.
+    pub(crate) fn what_to_execute(
+        &self,
+        cursor: &mut Cursor<'_>,
+        last: Option<&String>,
+    ) -> Result<(String, Option<u32>, usize), Fault> {
         let name = match cursor.peek() {
             Some(Token::Name(_)) => cursor.name()?,
-            _ => self
-                .executed_last
-                .clone()
-                .ok_or(Message::UndefinedProgram)?,
+            _ => last.cloned().ok_or(Message::UndefinedProgram)?,
         };
         let mut numbers = [1, 1];
         for number in &mut numbers {
@@ -378,9 +385,14 @@ impl Emulator {
         if step < 1 || cycles == 0 {
             return Err(Message::InvalidArgument.into());
         }
+        Ok((name, u32::try_from(cycles).ok(), step as usize - 1))
+    }
+
+    /// Carries out `EXECUTE [program][,cycles][,step]`.
+    fn execute(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let (name, cycles, step) = self.what_to_execute(cursor, self.executed_last.as_ref())?;
         self.need_standing_arm()?;
-        let cycles = u32::try_from(cycles).ok();
-        self.start_program(&name, cycles, step as usize - 1, false)?;
+        self.start_program(&name, cycles, step, false)?;
         self.executed_last = Some(name);
         Ok(())
     }

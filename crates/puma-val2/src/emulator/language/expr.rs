@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
-use crate::emulator::language::lexer::{Cursor, Token};
+use crate::emulator::language::lexer::{Cursor, GREATEST, Token};
 use crate::emulator::language::place_expr::{PlaceExpr, PlaceName};
 use crate::emulator::language::scope::Scope;
 use crate::emulator::message::{Fault, Message};
@@ -37,7 +37,8 @@ pub(crate) enum Expr {
 #[derive(Clone, Debug)]
 pub(crate) struct Variable {
     pub(crate) name: String,
-    pub(crate) index: Option<Box<Expr>>,
+    /// Up to three indices.
+    pub(crate) index: Box<[Expr]>,
 }
 
 /// Functions of numbers, with the least and the greatest number of arguments.
@@ -65,9 +66,12 @@ const PLACE_FUNCTIONS: [(&str, usize, OfPositions); 4] = [
 
 /// Binary operators in all their spellings, and their binding strengths, loosest first.
 #[allow(clippy::float_cmp)] // VAL's `==` compares as the controller does.
-const OPERATORS: [(&[&str], u8, OfTwo); 15] = [
+const OPERATORS: [(&[&str], u8, OfTwo); 18] = [
     (&["OR"], 1, |a, b| truth(is_true(a) || is_true(b))),
     (&["XOR"], 1, |a, b| truth(is_true(a) != is_true(b))),
+    (&["BOR"], 1, |a, b| bitwise(a, b, |a, b| a | b)),
+    (&["BXOR"], 1, |a, b| bitwise(a, b, |a, b| a ^ b)),
+    (&["BAND"], 2, |a, b| bitwise(a, b, |a, b| a & b)),
     (&["AND"], 2, |a, b| truth(is_true(a) && is_true(b))),
     (&["==", "EQ", "="], 4, |a, b| truth(a == b)),
     (&["<>", "NE"], 4, |a, b| truth(a != b)),
@@ -144,7 +148,7 @@ impl Expr {
         }
     }
 
-    fn parse_name(name: &str, cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
+    fn parse_name<'a>(name: &'a str, cursor: &mut Cursor<'a>) -> Result<Self, Fault> {
         match name {
             "NOT" => return Ok(Self::Not(Box::new(Self::parse_from(cursor, NOT_BINDS)?))),
             "TRUE" | "ON" => return Ok(Self::Number(-1.0)),
@@ -191,7 +195,7 @@ impl Expr {
         let found = FUNCTIONS
             .iter()
             .find(fits)
-            .ok_or(Message::InvalidArgument)?;
+            .ok_or_else(|| cursor.unknown_word(name))?;
         Ok(Self::Call(found.2, arguments))
     }
 
@@ -237,7 +241,7 @@ impl Expr {
             }
             Self::InRange(place) => f64::from(!scope.reaches(&place.place(scope)?)),
         };
-        if value.is_finite() {
+        if value.abs() <= GREATEST {
             Ok(value)
         } else {
             // A division by zero or the root of a negative number among them.
@@ -246,14 +250,17 @@ impl Expr {
     }
 }
 
-/// Parses an index in brackets, if one follows.
-pub(crate) fn parse_index(cursor: &mut Cursor<'_>) -> Result<Option<Box<Expr>>, Fault> {
+/// Parses up to three indices in brackets, if they follow.
+pub(crate) fn parse_index(cursor: &mut Cursor<'_>) -> Result<Box<[Expr]>, Fault> {
     if !cursor.sign("[") {
-        return Ok(None);
+        return Ok(Box::default());
     }
-    let index = Expr::parse(cursor)?;
+    let index = Expr::parse_list(cursor)?;
     cursor.expect_sign("]")?;
-    Ok(Some(Box::new(index)))
+    if index.len() > 3 {
+        return Err(Message::InvalidArgument.into());
+    }
+    Ok(index.into())
 }
 
 impl Variable {
@@ -265,17 +272,19 @@ impl Variable {
 
     /// Returns the name under which the value is kept: `A`, or `A[3]`.
     pub(crate) fn key(&self, scope: &dyn Scope) -> Result<String, Fault> {
-        key(&self.name, self.index.as_deref(), scope)
+        key(&self.name, &self.index, scope)
     }
 }
 
-/// Returns the name under which a value is kept: `A`, or `A[3]`.
-pub(crate) fn key(name: &str, index: Option<&Expr>, scope: &dyn Scope) -> Result<String, Fault> {
+/// Returns the name under which a value is kept: `A`, `A[3]`, `A[1,2]`.
+pub(crate) fn key(name: &str, index: &[Expr], scope: &dyn Scope) -> Result<String, Fault> {
     scope.check_name(name)?;
-    match index {
-        None => Ok(name.to_owned()),
-        Some(index) => Ok(format!("{name}[{}]", whole(index.value(scope)?, 0, 32767)?)),
+    if index.is_empty() {
+        return Ok(name.to_owned());
     }
+    let one = |index: &Expr| whole(index.value(scope)?, 0, 32767).map(|i| i.to_string());
+    let all: Result<Vec<_>, Fault> = index.iter().map(one).collect();
+    Ok(format!("{name}[{}]", all?.join(",")))
 }
 
 /// Converts to a whole number within bounds.
@@ -286,6 +295,14 @@ pub(crate) fn whole(value: f64, min: i32, max: i32) -> Result<i32, Fault> {
         return Ok(rounded as i32);
     }
     Err(Message::InvalidArgument.into())
+}
+
+/// Works on the digits of whole numbers; others have no value.
+fn bitwise(a: f64, b: f64, of: fn(i64, i64) -> i64) -> f64 {
+    match (whole(a, i32::MIN, i32::MAX), whole(b, i32::MIN, i32::MAX)) {
+        (Ok(a), Ok(b)) => of(a.into(), b.into()) as f64,
+        _ => f64::NAN,
+    }
 }
 
 fn truth(condition: bool) -> f64 {

@@ -75,7 +75,8 @@ pub(crate) enum Instruction {
     Ignore(Expr),
     SetPlace(PlaceName, PlaceExpr),
     Assign(Variable, Expr),
-    Here(PlaceName),
+    /// A location, or a compound whose last part is defined.
+    Here(Vec<PlaceName>),
     Decompose(Variable, PlaceExpr),
     Tool(Option<PlaceExpr>),
     Base([Option<Expr>; 4]),
@@ -84,7 +85,8 @@ pub(crate) enum Instruction {
     Goto(u32),
     IfGoto(Expr, u32),
     IfThen(Expr),
-    Else,
+    /// `ELSE`, or `ELSE IF` with a condition.
+    Else(Option<Expr>),
     End,
     For {
         variable: Variable,
@@ -153,7 +155,7 @@ static WORDS: [(&str, Word); 76] = [
     ("DO", Plain(I::Do)),
     ("DRAW", Parse(|c| arguments(c).map(I::Draw))),
     ("DRIVE", Parse(drive)),
-    ("ELSE", Plain(I::Else)),
+    ("ELSE", Parse(|c| c.rest(else_if).map(I::Else))),
     ("ENABLE", Parse(|c| switch(c, true))),
     ("END", Plain(I::End)),
     ("EXIT", Plain(I::LeaveLoop)),
@@ -164,7 +166,7 @@ static WORDS: [(&str, Word); 76] = [
     ("GOTO", Parse(|c| label(c).map(I::Goto))),
     ("GRASP", Parse(grasp)),
     ("HALT", Plain(I::Halt)),
-    ("HERE", Parse(|c| PlaceName::parse(c).map(I::Here))),
+    ("HERE", Parse(|c| PlaceName::parse_compound(c).map(I::Here))),
     ("IF", Parse(condition)),
     ("IGNORE", Parse(ignore)),
     ("INTOFF", Parse(settling)),
@@ -228,7 +230,11 @@ impl Instruction {
             Self::Assign(variable, Expr::parse(cursor)?)
         } else {
             cursor.next();
-            match keyword(name, &WORDS, Message::UnknownInstruction)? {
+            let word = keyword(name, &WORDS, Message::UnknownInstruction);
+            if word.is_err() {
+                cursor.unknown_word(name);
+            }
+            match word? {
                 Plain(instruction) => instruction.clone(),
                 Parse(parse) => parse(cursor)?,
             }
@@ -256,7 +262,7 @@ impl Instruction {
             self,
             Self::Goto(_)
                 | Self::IfGoto(..)
-                | Self::Else
+                | Self::Else(_)
                 | Self::Value(_)
                 | Self::Any
                 | Self::LeaveLoop
@@ -324,7 +330,7 @@ fn timer(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
         Some(Token::Number(number)) => Expr::Number(*number),
         Some(Token::Name(name)) => Expr::Variable(Variable {
             name: name.clone(),
-            index: None,
+            index: Box::default(),
         }),
         _ => return Err(Message::InvalidArgument.into()),
     };
@@ -412,11 +418,11 @@ fn set(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
 fn decompose(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
     let mut into = Variable {
         name: cursor.name()?,
-        index: None,
+        index: Box::default(),
     };
     // Empty brackets begin at element 0.
     if cursor.sign("[") && !cursor.sign("]") {
-        into.index = Some(Box::new(Expr::parse(cursor)?));
+        into.index = Box::new([Expr::parse(cursor)?]);
         cursor.expect_sign("]")?;
     }
     cursor.expect_sign("=")?;
@@ -451,6 +457,13 @@ fn condition(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
     }
     cursor.expect_word("GOTO")?;
     Ok(I::IfGoto(condition, label(cursor)?))
+}
+
+fn else_if(cursor: &mut Cursor<'_>) -> Result<Expr, Fault> {
+    cursor.expect_word("IF")?;
+    let condition = Expr::parse(cursor)?;
+    cursor.expect_word("THEN")?;
+    Ok(condition)
 }
 
 fn for_loop(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {

@@ -7,6 +7,7 @@ use crate::emulator::message::{Fault, Message};
 /// Part of the output of `TYPE`.
 #[derive(Clone, Debug)]
 pub(crate) enum Item {
+    /// A text, or `/B`: the bell.
     Text(String),
     Value(Expr),
     /// `/Xn`: blanks.
@@ -15,7 +16,7 @@ pub(crate) enum Item {
     Lines(usize),
     /// `/S`: no line end at the end.
     Stay,
-    /// `/Fw.d`: fixed point from here on. `/D`: back to the default.
+    /// `/Fw.d`: fixed point from here on. `/Iw`: whole numbers. `/D`: back to the default.
     Format(Option<(usize, usize)>),
 }
 
@@ -36,6 +37,8 @@ impl Item {
         let item = match letter {
             "X" => number(rest).map(Item::Blanks),
             "C" => number(rest).map(Item::Lines),
+            "B" if rest.is_empty() => Some(Item::Text("\u{7}".to_owned())),
+            "I" => number(rest).map(|width| Item::Format(Some((width, 0)))),
             "S" if rest.is_empty() => Some(Item::Stay),
             "D" if rest.is_empty() => Some(Item::Format(None)),
             "F" => rest.split_once('.').and_then(|(width, decimals)| {

@@ -11,6 +11,9 @@ pub(crate) enum Token {
     Sign(&'static str),
 }
 
+/// Greatest number that a variable holds; VAL's reals have single precision.
+pub(crate) const GREATEST: f64 = 1e38;
+
 const SIGNS: [&str; 20] = [
     "==", "<>", "<=", ">=", "=<", "=>", "<", ">", "=", "+", "-", "*", "/", "^", "(", ")", "[", "]",
     ":", ",",
@@ -34,7 +37,7 @@ pub(crate) fn tokens(line: &str) -> Result<Vec<Token>, Fault> {
             {
                 let end = number_length(rest);
                 let number: f64 = rest[..end].parse().map_err(|_| Message::InvalidArgument)?;
-                if !number.is_finite() || number.abs() > 1e15 {
+                if number > GREATEST {
                     return Err(Message::InvalidArgument.into());
                 }
                 found.push(Token::Number(number));
@@ -65,6 +68,18 @@ pub(crate) fn tokens(line: &str) -> Result<Vec<Token>, Fault> {
     Ok(found)
 }
 
+/// Returns the first word of a line that has a character in it that no token has, or the quote
+/// that does not end.
+pub(crate) fn strange_word(line: &str) -> String {
+    let known = |c: char| c.is_ascii_alphanumeric() || " _.;\"#".contains(c);
+    let strange = |c: char| !known(c) && SIGNS.iter().all(|sign| !sign.contains(c));
+    let open = line.matches('"').count() % 2 == 1;
+    let quote = line.rfind('"').filter(|_| open).map(|at| &line[at..]);
+    let mut words = line.split([' ', ',', '(', ')']);
+    let word = words.find(|word| word.contains(strange)).or(quote);
+    word.unwrap_or_default().to_owned()
+}
+
 /// Returns the length of the number that a text begins with, an exponent with digits included.
 fn number_length(text: &str) -> usize {
     let end = |from: usize, part: fn(char) -> bool| {
@@ -86,6 +101,8 @@ pub(crate) struct Cursor<'a> {
     tokens: &'a [Token],
     depth: usize,
     operators: usize,
+    /// First word that is no instruction or function.
+    unknown: Option<&'a str>,
 }
 
 /// Deepest nesting of brackets, signs and indices; no sensible line reaches it.
@@ -100,6 +117,7 @@ impl<'a> Cursor<'a> {
             tokens,
             depth: 0,
             operators: 0,
+            unknown: None,
         }
     }
 
@@ -188,6 +206,21 @@ impl<'a> Cursor<'a> {
         item: impl Fn(&mut Self) -> Result<T, Fault>,
     ) -> Result<Option<T>, Fault> {
         (!self.at_end()).then(|| item(self)).transpose()
+    }
+
+    /// Remembers a word that is not understood and returns the fault.
+    pub(crate) fn unknown_word(&mut self, word: &'a str) -> Fault {
+        self.unknown.get_or_insert(word);
+        Message::InvalidArgument.into()
+    }
+
+    /// Returns the first word that is not understood, or the one where the line ceased to be.
+    pub(crate) fn culprit(&self) -> String {
+        match (self.unknown, self.peek()) {
+            (Some(word), _) => word.to_owned(),
+            (None, Some(Token::Name(word))) => word.clone(),
+            _ => String::new(),
+        }
     }
 
     /// Goes one bracket deeper.

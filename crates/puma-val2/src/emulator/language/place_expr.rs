@@ -16,7 +16,7 @@ use crate::kinematics::xyzoat::Xyzoat;
 pub(crate) struct PlaceName {
     pub(crate) precision: bool,
     pub(crate) name: String,
-    pub(crate) index: Option<Box<Expr>>,
+    pub(crate) index: Box<[Expr]>,
 }
 
 impl PlaceName {
@@ -31,9 +31,18 @@ impl PlaceName {
         })
     }
 
+    /// Parses names joined by `:`.
+    pub(crate) fn parse_compound(cursor: &mut Cursor<'_>) -> Result<Vec<Self>, Fault> {
+        let mut names = vec![Self::parse(cursor)?];
+        while cursor.sign(":") {
+            names.push(Self::parse(cursor)?);
+        }
+        Ok(names)
+    }
+
     /// Returns the name under which the value is kept; that of a precision point begins with `#`.
     pub(crate) fn key(&self, scope: &dyn Scope) -> Result<String, Fault> {
-        let key = expr::key(&self.name, self.index.as_deref(), scope)?;
+        let key = expr::key(&self.name, &self.index, scope)?;
         Ok(if self.precision {
             format!("#{key}")
         } else {
@@ -54,6 +63,8 @@ enum Term {
     Turn(usize, Box<Expr>),
     Ppoint([Option<Expr>; 6]),
     Shift(Box<PlaceExpr>, [Option<Expr>; 3]),
+    /// `SCALE`: the position times a factor.
+    Scale(Box<PlaceExpr>, Box<Expr>),
     Inverse(Box<PlaceExpr>),
     Frame(Box<[PlaceExpr; 4]>),
     Here,
@@ -108,6 +119,7 @@ impl Term {
                 cursor.next();
                 let term = match name.as_str() {
                     "TRANS" => Self::Trans(arguments(cursor)?),
+                    "PPOINT" => Self::Ppoint(arguments(cursor)?),
                     "RX" => Self::Turn(0, Box::new(Expr::parse(cursor)?)),
                     "RY" => Self::Turn(1, Box::new(Expr::parse(cursor)?)),
                     "RZ" => Self::Turn(2, Box::new(Expr::parse(cursor)?)),
@@ -116,12 +128,17 @@ impl Term {
                         cursor.expect_word("BY")?;
                         Self::Shift(Box::new(of), arguments(cursor)?)
                     }
+                    "SCALE" => {
+                        let of = PlaceExpr::parse(cursor)?;
+                        cursor.expect_word("BY")?;
+                        Self::Scale(Box::new(of), Box::new(Expr::parse(cursor)?))
+                    }
                     "INVERSE" => Self::Inverse(Box::new(PlaceExpr::parse(cursor)?)),
                     "FRAME" => {
                         let of = cursor.list(PlaceExpr::parse)?.try_into();
                         Self::Frame(Box::new(of.map_err(|_| Message::InvalidArgument)?))
                     }
-                    _ => return Err(Message::InvalidArgument.into()),
+                    _ => return Err(cursor.unknown_word(name)),
                 };
                 cursor.expect_sign(")")?;
                 Ok(term)
@@ -168,6 +185,11 @@ impl Term {
                 let by = Vector3::from(values(by, scope)?) / 1000.0;
                 let mut pose = of.transformation(scope)?;
                 pose.translation.vector += by;
+                Place::Transformation(pose)
+            }
+            Self::Scale(of, by) => {
+                let mut pose = of.transformation(scope)?;
+                pose.translation.vector *= by.value(scope)?;
                 Place::Transformation(pose)
             }
             Self::Inverse(of) => Place::Transformation(of.transformation(scope)?.inverse()),

@@ -1,7 +1,7 @@
 //! A stored program: its steps, and which step each control word leads to.
 
 use crate::emulator::language::instruction::{Instruction, label};
-use crate::emulator::language::lexer::{Cursor, Token, tokens};
+use crate::emulator::language::lexer::{Cursor, Token, strange_word, tokens};
 use crate::emulator::language::val;
 use crate::emulator::message::{Fault, Message};
 
@@ -25,17 +25,26 @@ pub(crate) struct Step {
 impl Step {
     /// Parses a line: an optional label and an instruction. `first_val` takes the forms of VAL.
     pub(crate) fn parse(line: &str, first_val: bool) -> Result<Self, Fault> {
-        let tokens = if first_val {
-            tokens(&val::translated(line))?
-        } else {
-            tokens(line)?
+        Self::parse_or_word(line, first_val).map_err(|(fault, _)| fault)
+    }
+
+    /// Parses a line. The error has the first word that is not understood, if it is one word.
+    pub(crate) fn parse_or_word(line: &str, first_val: bool) -> Result<Self, (Fault, String)> {
+        let line = printable(line);
+        let said = match first_val {
+            true => val::translated(&line),
+            false => line.clone(),
         };
+        let tokens = tokens(&said).map_err(|fault| (fault, strange_word(&said)))?;
         let mut cursor = Cursor::new(&tokens);
         let labelled = matches!(cursor.peek(), Some(Token::Number(_)));
+        let parsed = labelled.then(|| label(&mut cursor)).transpose();
+        let parsed = parsed.and_then(|label| Ok((label, Instruction::parse(&mut cursor)?)));
+        let (label, instruction) = parsed.map_err(|fault| (fault, cursor.culprit()))?;
         Ok(Self {
-            label: labelled.then(|| label(&mut cursor)).transpose()?,
+            label,
             text: upper_case(line.trim()),
-            instruction: Instruction::parse(&mut cursor)?,
+            instruction,
         })
     }
 }
@@ -45,6 +54,17 @@ pub(crate) fn local_name(cursor: &mut Cursor<'_>) -> Result<String, Fault> {
     let precision = cursor.sign("#");
     let name = cursor.name()?;
     Ok(if precision { format!("#{name}") } else { name })
+}
+
+/// Replaces what no terminal shows: a tabulator by a blank, other characters by question marks.
+fn printable(line: &str) -> String {
+    line.chars()
+        .map(|c| match c {
+            ' '..='~' => c,
+            c if c.is_whitespace() => ' ',
+            _ => '?',
+        })
+        .collect()
 }
 
 /// Converts to upper case, except texts in quotes and comments.
@@ -103,7 +123,7 @@ impl Program {
                 word if word.opens() => depth += 1,
                 word if word.closes() && depth > 0 => depth -= 1,
                 word if word.closes() => return Ok(i),
-                Instruction::Else | Instruction::Value(_) | Instruction::Any if depth == 0 => {
+                Instruction::Else(_) | Instruction::Value(_) | Instruction::Any if depth == 0 => {
                     return Ok(i);
                 }
                 _ => {}
@@ -157,7 +177,7 @@ impl Program {
                     open.push(head);
                     true
                 }
-                Instruction::Else => matches!(open.last(), Some(Instruction::IfThen(_))),
+                Instruction::Else(_) => matches!(open.last(), Some(Instruction::IfThen(_))),
                 Instruction::Value(_) | Instruction::Any => {
                     matches!(open.last(), Some(Instruction::Case(_)))
                 }

@@ -28,7 +28,13 @@ impl Emulator {
                 Flow::Jump(program.labelled(*label)?)
             }
             Instruction::IfThen(condition) if !is_true(condition.value(&scope)?) => {
-                Flow::Jump(program.next_part(at)? + 1)
+                let mut part = program.next_part(at)?;
+                while let Instruction::Else(Some(condition)) = &program.steps[part].instruction
+                    && !is_true(condition.value(&scope)?)
+                {
+                    part = program.next_part(part)?;
+                }
+                Flow::Jump(part + 1)
             }
             Instruction::While(condition) if !is_true(condition.value(&scope)?) => {
                 Flow::Jump(program.end_of(at)? + 1)
@@ -41,7 +47,7 @@ impl Emulator {
             | Instruction::While(_)
             | Instruction::Until(_)
             | Instruction::Do => Flow::Next,
-            Instruction::Else | Instruction::Value(_) | Instruction::Any => {
+            Instruction::Else(_) | Instruction::Value(_) | Instruction::Any => {
                 Flow::Jump(program.end_of(at)? + 1)
             }
             Instruction::LeaveLoop => Flow::Jump(program.end_of(program.loop_of(at)?)? + 1),

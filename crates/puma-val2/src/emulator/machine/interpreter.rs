@@ -6,10 +6,11 @@ use crate::emulator::controller::{Emulator, Event};
 use crate::emulator::language::expr::{Expr, is_true, whole};
 use crate::emulator::language::instruction::{Instruction, SpeedUnit};
 use crate::emulator::language::place::Place;
-use crate::emulator::language::place_expr::values;
+use crate::emulator::language::place_expr::{PlaceName, values};
 use crate::emulator::language::scope::Scope;
 use crate::emulator::machine::arm::Speed;
-use crate::emulator::machine::job::{Flow, Job, Wait};
+use crate::emulator::machine::job::{Flow, Job, JobKind, Wait};
+use crate::emulator::machine::process;
 use crate::emulator::machine::reaction::Reaction;
 use crate::emulator::message::{Fault, Message};
 use crate::joints::{Joint, Joints};
@@ -21,7 +22,11 @@ impl Emulator {
         instruction: &Instruction,
         job: &mut Job,
     ) -> Result<Flow, Fault> {
-        if self.arm.moving() && needs_standing_arm(instruction) {
+        if job.kind == JobKind::Process && !process::takes(instruction) {
+            return Err(Message::IllegalInstruction.into());
+        }
+        let waits = job.kind != JobKind::Process && needs_standing_arm(instruction);
+        if self.arm.moving() && waits {
             return Ok(Flow::WhenStanding);
         }
         if is_motion(instruction) {
@@ -135,15 +140,13 @@ impl Emulator {
                 let (key, value) = (variable.key(&scope)?, number(value)?);
                 self.memory.set_real(key, value, &self.profile)?;
             }
-            Instruction::Here(name) => {
-                let (key, place) = (name.key(&scope)?, self.here(name.precision));
+            Instruction::Here(names) => {
+                let (key, place) = self.taught(names)?;
                 self.memory.set_place(key, place, &self.profile)?;
             }
             Instruction::Decompose(into, place) => {
-                let first = match &into.index {
-                    Some(index) => whole(number(index)?, 0, 32000)?,
-                    None => 0,
-                };
+                let first = into.index.first().map_or(Ok(0.0), number)?;
+                let first = whole(first, 0, 32000)?;
                 scope.check_name(&into.name)?;
                 for (i, value) in (first..).zip(place.place(&scope)?.val()) {
                     self.memory
@@ -325,12 +328,25 @@ impl Emulator {
         Ok(self.motion_started(begun, before))
     }
 
-    pub(crate) fn here(&self, precision: bool) -> Place {
-        if precision {
-            Place::PrecisionPoint(self.arm.shown())
-        } else {
-            Place::Transformation(self.scope().here())
+    /// Returns the key and the value of a location at which the arm stands. Of a compound the last
+    /// part is meant, relative to the parts before it.
+    pub(crate) fn taught(&self, names: &[PlaceName]) -> Result<(String, Place), Fault> {
+        let scope = self.scope();
+        let (last, frame) = names.split_last().ok_or(Message::InvalidArgument)?;
+        let key = last.key(&scope)?;
+        if last.precision {
+            let alone = frame.is_empty().then_some(());
+            alone.ok_or(Message::InvalidArgument)?;
+            return Ok((key, Place::PrecisionPoint(self.arm.shown())));
         }
+        let mut pose = scope.here();
+        for name in frame {
+            let Place::Transformation(part) = scope.place(&name.key(&scope)?)? else {
+                return Err(Message::InvalidArgument.into());
+            };
+            pose = part.inverse() * pose;
+        }
+        Ok((key, Place::Transformation(pose)))
     }
 
     pub(crate) fn set_base(&mut self, [dx, dy, dz, turn]: [f64; 4]) {

@@ -42,6 +42,8 @@ pub(crate) enum JobKind {
     Program,
     Do,
     Calibration,
+    /// A process-control program, which runs beside the others.
+    Process,
 }
 
 #[derive(Debug)]
@@ -100,7 +102,7 @@ pub(crate) enum Flow {
 }
 
 impl Job {
-    fn new(kind: JobKind, now: Duration) -> Self {
+    pub(crate) fn new(kind: JobKind, now: Duration) -> Self {
         Self {
             kind,
             frames: Vec::new(),
@@ -128,8 +130,14 @@ impl Job {
             .map(|f| (f.name.as_str(), f.step + ahead))
     }
 
-    pub(crate) fn cycles_left(&self) -> Option<u32> {
-        self.cycles_left
+    /// Returns the line that tells of the end, with the step unless the program is complete.
+    pub(crate) fn ended(&self, text: &str, how: Message) -> String {
+        match self.at() {
+            Some((name, step)) if how != Message::Completed => {
+                format!("{text} at {name}, step {step}")
+            }
+            _ => text.to_owned(),
+        }
     }
 
     /// Returns `true` while a `WAIT` or `PROMPT` waits.
@@ -139,7 +147,7 @@ impl Job {
 }
 
 impl Emulator {
-    fn step_time(&self) -> Duration {
+    pub(crate) fn step_time(&self) -> Duration {
         self.profile.step_time.max(Duration::from_micros(100))
     }
 
@@ -387,16 +395,10 @@ impl Emulator {
                     self.calibration_done();
                 }
             }
-            JobKind::Do => {}
+            JobKind::Do | JobKind::Process => {}
             JobKind::Program => {
                 let text = self.profile.text(how).to_owned();
-                let line = match job.at() {
-                    Some((name, step)) if how != Message::Completed => {
-                        format!("{text} at {name}, step {step}")
-                    }
-                    _ => text,
-                };
-                self.print_line(&line);
+                self.print_line(&job.ended(&text, how));
                 if let Some(signal) = job.run_signal {
                     // It could be switched on.
                     let _ = self.signals.command(-signal);
@@ -419,7 +421,7 @@ impl Emulator {
     }
 
     /// Carries out one step of a program. `Some` is the end of the program.
-    fn program_step(&mut self, job: &mut Job) -> Result<Option<Message>, Fault> {
+    pub(crate) fn program_step(&mut self, job: &mut Job) -> Result<Option<Message>, Fault> {
         let Some(frame) = job.frames.last_mut() else {
             return Ok(Some(Message::Completed));
         };

@@ -56,7 +56,8 @@ impl Memory {
         value: f64,
         profile: &Profile,
     ) -> Result<(), Fault> {
-        insert(&mut self.reals, key, value, profile)
+        // Zero has no sign.
+        insert(&mut self.reals, key, value + 0.0, profile)
     }
 
     pub(crate) fn set_parameter(

@@ -8,6 +8,7 @@ pub(crate) mod job;
 pub(crate) mod memory;
 mod motion;
 mod path;
+pub(crate) mod process;
 pub(crate) mod reaction;
 pub(crate) mod scope;
 pub(crate) mod signals;

@@ -61,7 +61,10 @@ fn a_flipped_bit_never_moves_the_arm_to_an_old_goal() {
 /// The arm and the abilities of a PUMA 260.
 fn small(way: MoveWay) -> Subject<'static> {
     Subject {
-        arm: PumaParams::puma_260(PumaParams::unimation().ranges),
+        arm: PumaParams {
+            ranges: PumaParams::unimation().ranges,
+            ..PumaParams::puma_260([90.0; 6])
+        },
         ..used(Profile::val2_strict_miz(), way)
     }
 }

@@ -130,3 +130,117 @@ fn the_editor_replaces_a_step() {
         "{listed}"
     );
 }
+
+#[test]
+fn a_v_plus_file_loads_or_names_its_first_unknown_line() {
+    let mut console = Console::ready();
+    console
+        .emulator
+        .load_text(".PROGRAM belt()\n TYPE 1\n.END")
+        .unwrap();
+    for (step, word) in [
+        ("WAIT.EVENT 1", "WAIT.EVENT"),
+        ("10 ATTACH (5)", "ATTACH"),
+        ("$a = \"text\"", "$a"),
+        ("n = n + LEN(5)*ABS(1)", "LEN"),
+        ("SET p = here2(1):q", "HERE2"),
+        ("S 1", "S"),
+        ("TYPE \"open", "\"open"),
+        ("MOVE p NOW", "NOW"),
+    ] {
+        let text = format!(".PROGRAM a()\n TYPE 1\n {step}\n FROB 2\n.END");
+        let error = console.emulator.load_text(&text).unwrap_err();
+        assert_eq!((error.line, error.word.as_str()), (3, word), "{error}");
+        console.emulator.insert_file("BAD", text);
+        let said = console.line("LOAD BAD");
+        assert!(said.contains(&format!("Line 3: {step}\r\n*")), "{said}");
+    }
+    assert!(console.line("DIRECTORY").contains("BELT"));
+    assert!(!console.line("DIRECTORY").contains("\nA\r"));
+}
+
+#[test]
+fn a_process_program_runs_beside_the_robots_program() {
+    let mut console = Console::ready();
+    console.program("PC", "IF SIG(3) THEN\nN = N+1\nSIGNAL -3\nEND\nDELAY 0.1");
+    console.program(
+        "WORK",
+        "FOR I = 1 TO 3\nMOVE #PPOINT(I,-90,90)\nBREAK\nSIGNAL 3\nDELAY 1\nEND",
+    );
+    console.line("DO N = 0");
+    assert!(
+        console
+            .line_now("PCSTATUS")
+            .contains("NO PROCESS PROGRAM EXECUTING")
+    );
+    assert!(
+        console
+            .line_now("PCABORT")
+            .contains("*No program executing*")
+    );
+    console.line_now("PCEXECUTE PC,-1");
+    let status = console.line_now("PCSTATUS");
+    assert!(
+        status.contains("PROCESS PROGRAM PC") && status.contains("FOREVER"),
+        "{status}"
+    );
+    assert!(
+        console
+            .line_now("PCEXECUTE WORK")
+            .contains("*Program executing*")
+    );
+    console.line_now("EXECUTE WORK");
+    console.wait(std::time::Duration::from_secs(10));
+    assert!(
+        console.screen.contains("Program completed"),
+        "{}",
+        console.screen
+    );
+    assert_eq!(console.emulator.real("N"), Some(3.0));
+    assert!(console.line_now("STATUS").contains("NO PROGRAM EXECUTING"));
+    assert!(
+        console
+            .line_now("PCABORT")
+            .contains("PC: Program aborted at PC, step")
+    );
+    // It goes on where it was, and ends with its cycle.
+    console.line_now("PCPROCEED");
+    console.line_now("PCEND");
+    assert!(
+        console
+            .wait(std::time::Duration::from_secs(1))
+            .contains("PC: Program completed")
+    );
+    // It has no arm.
+    console.program("BAD", "TYPE 1\nMOVE #PPOINT(9,-90,90)");
+    let said = console.line("PCEXECUTE BAD");
+    assert!(
+        said.contains("*Illegal instruction*\r\nPC: Program aborted at BAD, step 2"),
+        "{said}"
+    );
+    assert!(said.ends_with("\r\n."), "{said}");
+    console.line_now("PCEXECUTE PC,-1");
+    console.lines("ZERO\nY");
+    assert!(console.line_now("PCSTATUS").contains("NO PROCESS PROGRAM"));
+}
+
+#[test]
+fn further_conditions_indices_and_compounds_do_what_they_say() {
+    let mut console = Console::ready();
+    let said = console.run(
+        "FOR I = 1 TO 4\nIF I == 1 THEN\nTYPE \"one\"\nELSE IF I == 2 THEN\nTYPE \"two\"
+        ELSE IF I == 3 THEN\nTYPE \"three\"\nELSE\nTYPE \"many\"\nEND\nEND
+        A[1,2] = 5\nA[2,1,0] = 7\nTYPE A[1,2]+A[2,1,0]
+        SET F = TRANS(100,200,300,90,-90,0):RZ(30)\nHERE F:P\nSET Q[3,4] = F:P
+        TYPE DISTANCE(HERE,Q[3,4]) < 0.001,DX(SCALE(F BY 2))",
+    );
+    let typed: Vec<&str> = said.lines().map(|l| l.trim_matches(['*', ' '])).collect();
+    let from = typed.iter().position(|line| *line == "one").unwrap();
+    assert_eq!(
+        typed[from..from + 6],
+        ["one", "two", "three", "many", "12", "-1 200"],
+        "{said}"
+    );
+    assert!(console.line("HERE F:#P").contains("*Invalid argument*"));
+    assert!(console.line("HERE NOWHERE:P").contains("*Undefined value*"));
+}

@@ -3,6 +3,7 @@
 mod blending;
 mod dialects;
 mod motions;
+mod owners;
 mod programs;
 mod published;
 mod reactions;

@@ -1,0 +1,9 @@
+//! Any text as a backup of a controller.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+#[path = "../../crates/puma-val2/tests/it/fuzz_targets.rs"]
+mod targets;
+
+fuzz_target!(|data: &[u8]| targets::run("val2_backup", data));

@@ -1,0 +1,9 @@
+//! Any text as the description of an arm.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+#[path = "../../crates/puma-val2/tests/it/fuzz_targets.rs"]
+mod targets;
+
+fuzz_target!(|data: &[u8]| targets::run("val2_urdf", data));
