@@ -2,6 +2,7 @@
 //!
 //! The targets of the folder `fuzz` include this file.
 
+use std::cell::RefCell;
 use std::io;
 use std::time::Duration;
 
@@ -57,23 +58,34 @@ const REPLIES: &str = "\u{1}.\u{20}\r\nCan this be (Y/N)? \u{a}\r\n*Arm off*\u{4
 const WHERE: &str = "WHERE\r\n X Y Z O A T\r\n -20.32 149.09 921.12 90 -90 0\r\n JT1 JT2 JT3 JT4 \
 JT5 JT6\r\n 0.000 -90.000 90.000 0.000 0.000 -0.001\r\n.";
 
+fn connected() -> Val2Client<MemoryLine> {
+    let emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
+    Val2Client::connect(MemoryLine::new(emulator), ClientConfig::default())
+        .expect("a sound controller answers")
+}
+
 /// A text as a backup: what can be restored is backed up and restored again.
 fn backup(data: &[u8]) {
+    thread_local! {
+        /// An empty controller. To connect takes longer than to refuse most texts.
+        static EMPTY: RefCell<Option<Val2Client<MemoryLine>>> = const { RefCell::new(None) };
+    }
     let text = String::from_utf8_lossy(data);
-    let emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
-    let mut client = Val2Client::connect(MemoryLine::new(emulator), ClientConfig::default())
-        .expect("a sound controller answers");
-    if client.restore_plan(&text).is_err() || client.restore(&text, true).is_err() {
+    let plan =
+        EMPTY.with_borrow_mut(|empty| empty.get_or_insert_with(connected).restore_plan(&text));
+    let mut client = match plan {
+        Ok(_) => connected(),
+        Err(_) => return,
+    };
+    if client.restore(&text, true).is_err() {
         return;
     }
     let backup = client.backup().expect("a sound controller lists");
     let kept = client
         .restore(&backup, false)
         .expect("a backup is restored");
-    assert!(
-        kept.iter().all(|line| line.starts_with("keep ")),
-        "{backup}"
-    );
+    let is_kept = |line: &String| line.starts_with("keep ");
+    assert!(kept.iter().all(is_kept), "{backup}");
 }
 
 /// Bytes typed to a controller, at its start-up or when it is calibrated. The first one chooses
