@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::time::Duration;
 
-use crate::client::dialogue::Mode;
+use crate::client::dialogue::{Mode, last_line};
 use crate::client::reader::{Ending, lines_said};
 use crate::client::val2_client::Val2Client;
 use crate::client::wire::{Failed, is_doubt};
@@ -20,7 +20,7 @@ const LISTING_TIME: Duration = Duration::from_secs(1800);
 
 impl<T: Transport> Val2Client<T> {
     /// Types any line to the monitor and returns what the controller says, without the echo and the
-    /// prompt. A question is left with no, or as `config` says for a program's.
+    /// prompt. A question is the last line; it is left with no.
     ///
     /// # Errors
     /// [`ArmError::Setting`] for a line that is not printable; otherwise errors of the line. A
@@ -29,10 +29,12 @@ impl<T: Transport> Val2Client<T> {
         check_line("a line", line)?;
         self.last_known = None;
         let reply = self.wire.exchange(line, self.longest_motion())?;
+        let mut lines = lines_said(&reply.text, line);
         if reply.ending == Ending::Question {
+            lines.push(last_line(&reply.text).trim().to_owned());
             self.wire.settle()?;
         }
-        Ok(lines_said(&reply.text, line).join("\n"))
+        Ok(lines.join("\n"))
     }
 
     /// Reads a listing until it is shown the same twice in a row.
@@ -140,7 +142,13 @@ impl<T: Transport> Val2Client<T> {
             .rename(&old, name)
             .and_then(|()| self.rename(name, new));
         if replaced.is_err() {
-            let _ = self.wire.settle().and_then(|_| self.rename(name, &old));
+            let names = self.wire.settle().and_then(|_| self.names_now());
+            let _ = match names {
+                Ok(names) if names.iter().any(|n| n.eq_ignore_ascii_case(name)) => {
+                    self.delete('P', &old)
+                }
+                _ => self.rename(name, &old),
+            };
             return replaced;
         }
         let mut deleted = self.delete('P', &old);
@@ -153,18 +161,24 @@ impl<T: Transport> Val2Client<T> {
     /// Deletes the programs that were being typed when a call failed, but none of `spared`.
     pub(super) fn delete_scratch(&mut self, spared: &HashSet<&str>) -> Result<(), ArmError> {
         self.wire.settle()?;
-        // Not by a listing, which may take half an hour.
-        let reply = self.say("DIRECTORY")?;
-        self.without_message("DIRECTORY", &reply)?;
-        let lines = lines_said(&reply.text, "DIRECTORY");
-        for name in lines.iter().flat_map(|line| line.split_whitespace()) {
+        for name in self.names_now()? {
             let number = name.strip_prefix("PGN");
             let is_scratch = name == NEW || number.is_some_and(|n| n.parse::<u32>().is_ok());
-            if is_scratch && !spared.contains(name) {
-                self.delete('P', name)?;
+            if is_scratch && !spared.contains(name.as_str()) {
+                self.delete('P', &name)?;
             }
         }
         Ok(())
+    }
+
+    /// Returns the names of the programs as shown once: after a failure a listing could take half
+    /// an hour.
+    fn names_now(&mut self) -> Result<Vec<String>, ArmError> {
+        let reply = self.say("DIRECTORY")?;
+        self.without_message("DIRECTORY", &reply)?;
+        let lines = lines_said(&reply.text, "DIRECTORY");
+        let names = lines.iter().flat_map(|line| line.split_whitespace());
+        Ok(names.map(str::to_owned).collect())
     }
 
     fn rename(&mut self, new: &str, old: &str) -> Result<(), ArmError> {

@@ -197,17 +197,19 @@ pub(super) fn run(
             let (head, steps) = client.listed(name)?;
             let body: String = steps.iter().map(|step| format!(" {step}\n")).collect();
             let text = format!(".PROGRAM {head}\n{body}.END");
-            print(globals, &text, &json!({"program": name, "steps": steps}))?;
+            let value = json!({"program": name, "head": head, "steps": steps});
+            print(globals, &text, &value)?;
         }
         Command::Put { file }
         | Command::Restore {
             file,
             dry_run: false,
         } => {
-            restore(globals, &mut client, &read(file)?)?;
+            restore(globals, &mut client, file)?;
         }
         Command::Restore { file, .. } => {
-            show_plan(globals, &client.restore_plan(&read(file)?)?)?;
+            let plan = client.restore_plan(&read(file)?);
+            show_plan(globals, &plan.map_err(|error| in_file(file, error))?)?;
         }
         Command::Rm { name } => {
             confirm(globals, &format!("{name} will be deleted."))?;
@@ -328,15 +330,16 @@ fn said(globals: &Globals, client: &mut Client<'_>, line: &str) -> Result<(), Fa
     let text = client.send_line(line)?;
     let lines: Vec<&str> = text.lines().collect();
     print(globals, &text, &json!({"line": line, "answer": lines}))?;
-    match lines
-        .iter()
-        .find(|l| l.len() > 2 && l.starts_with('*') && l[1..].contains('*'))
-    {
-        None => Ok(()),
-        Some(message) => Err(Failure {
-            text: format!("`{line}` was refused: {message}"),
-            code: 3,
-        }),
+    let is_message = |l: &&&str| l.len() > 2 && l.starts_with('*') && l[1..].contains('*');
+    if let Some(message) = lines.iter().find(is_message) {
+        let text = format!("`{line}` was refused: {message}");
+        return Err(Failure { text, code: 3 });
+    }
+    match lines.last() {
+        Some(question) if question.ends_with('?') => Err(Failure::unconfirmed(format!(
+            "`{line}` asks {question:?}, which was left with no: answer it in `val2 term`"
+        ))),
+        _ => Ok(()),
     }
 }
 
@@ -374,24 +377,31 @@ fn read(file: &Path) -> Result<String, Failure> {
     })
 }
 
-fn restore(globals: &Globals, client: &mut Client<'_>, text: &str) -> Result<(), Failure> {
-    let plan = match client.restore(text, globals.yes) {
-        Err(ArmError::Conflict { names, port }) if io::stdin().is_terminal() => {
-            confirm(
-                globals,
-                &format!("{port} holds other contents of {names}, to be replaced."),
-            )?;
-            client.restore(text, true)?
-        }
-        Err(error @ ArmError::Conflict { .. }) => {
+fn restore(globals: &Globals, client: &mut Client<'_>, file: &Path) -> Result<(), Failure> {
+    let text = read(file)?;
+    let mut outcome = client.restore(&text, globals.yes);
+    if let Err(error @ ArmError::Conflict { port, names }) = &outcome {
+        if !io::stdin().is_terminal() {
             return Err(Failure::unconfirmed(format!(
                 "{error}: --yes replaces them"
             )));
         }
-        outcome => outcome?,
-    };
-    show_plan(globals, &plan)?;
-    Ok(())
+        let what = format!("{port} holds other contents of {names}, to be replaced.");
+        confirm(globals, &what)?;
+        outcome = client.restore(&text, true);
+    }
+    let plan = outcome.map_err(|error| in_file(file, error))?;
+    show_plan(globals, &plan)
+}
+
+/// Returns the failure of a text with the name of its file.
+fn in_file(file: &Path, error: ArmError) -> Failure {
+    let by_line = matches!(error, ArmError::Text { .. } | ArmError::Step { .. });
+    let mut failure = Failure::from(error);
+    if by_line {
+        failure.text = format!("{}: {}", file.display(), failure.text);
+    }
+    failure
 }
 
 fn show_plan(globals: &Globals, plan: &[String]) -> Result<(), Failure> {

@@ -32,7 +32,7 @@ pub(super) struct Options {
     /// speeds of all are those of the 560.
     #[arg(long, value_name = "NUMBER", default_value = "560", value_parser = ["260", "560", "762"])]
     arm: String,
-    /// Behaviour of the controller: val2, val2_strict_miz, val2_hardware, val.
+    /// Behaviour of the controller: val2, val2_strict_miz, val2_hardware, val (of 1980).
     #[arg(long, value_name = "NAME", default_value = "val2")]
     profile: String,
     /// Let motions take their time. Otherwise the controller's clock jumps ahead whenever it waits

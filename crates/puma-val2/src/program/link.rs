@@ -115,7 +115,9 @@ fn config(globals: &Globals) -> Result<ClientConfig, Failure> {
 fn open(globals: &Globals) -> Result<Link, Failure> {
     let interrupted = Arc::new(AtomicBool::new(false));
     signal_hook::flag::register(signal_hook::consts::SIGINT, Arc::clone(&interrupted))?;
-    let variable = std::env::var("VAL2_PORT").ok();
+    let variable = std::env::var("VAL2_PORT")
+        .ok()
+        .filter(|port| !port.is_empty());
     let mut line: Box<dyn Transport> =
         match (&globals.tcp, globals.port.as_ref().or(variable.as_ref())) {
             (Some(address), _) => Box::new(TcpLine::connect(address, Duration::from_secs(5))?),

@@ -51,8 +51,8 @@ struct Globals {
     /// Arm, whose ranges are checked before a move: 260, 560 (the default) or 762.
     #[arg(long, value_name = "NUMBER", value_parser = ["260", "560", "762"])]
     arm: Option<String>,
-    /// Abilities of the controller: val2 (the default), val2_hardware, val, or val2_strict_miz,
-    /// which knows neither control characters nor #PPOINT.
+    /// Abilities of the controller: val2 (the default), val2_hardware, val (of 1980), or
+    /// val2_strict_miz, which knows neither control characters nor #PPOINT.
     #[arg(long, value_name = "NAME")]
     profile: Option<String>,
     /// Write what passes on the line to this file.
@@ -176,7 +176,7 @@ enum Command {
         #[arg(value_parser = ["on", "off"])]
         state: Option<String>,
     },
-    /// Type a line to the monitor and print the answer.
+    /// Type a line to the monitor and print the answer. A question is left with no.
     Send {
         /// The line.
         #[arg(required = true, trailing_var_arg = true, allow_hyphen_values = true)]

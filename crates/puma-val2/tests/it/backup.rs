@@ -6,7 +6,10 @@ use puma_val2::{
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
-const MEMORY: &str = ".PROGRAM PICK
+const MEMORY: &str = ".PROGRAM LAYER(A,B)
+ TYPE A
+.END
+.PROGRAM PICK
  10 APPRO PART,50 ; above the part
  MOVES PART
  CLOSEI
@@ -60,12 +63,14 @@ fn a_backup_restored_after_zero_lists_the_same() {
             "{kept:?}"
         );
         client.line_mut().emulator_mut().load_text("").unwrap();
-        for line in ["PICK", "WORK", "#REST", "PART", "Q[2]", "A[3]", "N"] {
+        for line in [
+            "LAYER", "PICK", "WORK", "#REST", "PART", "Q[2]", "A[3]", "N",
+        ] {
             client.remove(line).unwrap();
         }
         assert_eq!(client.backup().unwrap(), "");
         let plan = client.restore_plan(&backup).unwrap();
-        assert_eq!(plan.len(), 7);
+        assert_eq!(plan.len(), 8);
         assert_eq!(client.restore(&backup, false).unwrap(), plan);
         assert_eq!(lists(&mut client), before);
         assert_eq!(client.backup().unwrap(), backup);

@@ -39,8 +39,14 @@ impl Console {
     /// Types a line and returns what follows on the screen until nothing more is due within a
     /// minute, or for a tenth of a second where something goes on and on.
     pub(crate) fn line(&mut self, line: &str) -> String {
+        self.typed(&format!("{line}\r"))
+    }
+
+    /// Types text with the line ends that it brings, and returns what follows as
+    /// [`Console::line`] does.
+    pub(crate) fn typed(&mut self, text: &str) -> String {
         let before = self.screen.len();
-        let said = self.emulator.feed(format!("{line}\r").as_bytes(), self.now);
+        let said = self.emulator.feed(text.as_bytes(), self.now);
         self.show(&said);
         self.settle();
         self.screen[before..].to_owned()

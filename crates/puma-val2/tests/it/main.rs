@@ -25,6 +25,7 @@ mod budget;
 mod client;
 mod client_robustness;
 mod console;
+mod drivers;
 mod emulator_robustness;
 mod faults;
 mod forms;

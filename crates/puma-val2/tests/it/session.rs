@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::console::Console;
 use puma_val2::Profile;
 
-fn compare(name: &str, screen: &str) {
+pub(crate) fn compare(name: &str, screen: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("tests/golden")
         .join(name);
