@@ -60,8 +60,8 @@
 //!
 //! Without an echo a single line cannot be checked. [`MoveWay::Automatic`] and
 //! [`Val2Client::move_hand`] then move by `POINT`, whose display is compared, and a stored program
-//! (`PGMOVE`), which shows the point once more and moves only after an answer. Motions by `DRIVE`
-//! or `#PPOINT` are refused.
+//! (`PGMOVE`), which shows a sum of the point's values and moves only after an answer. Motions by
+//! `DRIVE` or `#PPOINT` are refused.
 //!
 //! [`Val2Client::arm_proximity`] lets the controller itself stop the arm on a signal. While this
 //! guard is armed, every motion is guarded or refused. A short pulse counts too: the program that
