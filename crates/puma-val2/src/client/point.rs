@@ -61,8 +61,8 @@ impl<T: Transport> Val2Client<T> {
     /// armed, at `speed` percent of the monitor's speed.
     ///
     /// Without an echo a damaged name could be that of a point that another damaged line has made.
-    /// There a stored program, whose listing has been compared, moves to the point after it has shown
-    /// a sum of its values.
+    /// There a stored program, whose listing has been compared, shows a sum of the point's values
+    /// and then moves to it.
     pub(super) fn move_to_point(
         &mut self,
         word: &str,
