@@ -24,6 +24,7 @@ pub(super) struct Link {
 
 impl Link {
     /// Returns `true` if Ctrl-C has come.
+    #[cfg(unix)]
     pub(super) fn is_interrupted(&self) -> bool {
         self.interrupted.load(Ordering::Acquire) || self.failed.get()
     }
