@@ -22,14 +22,15 @@ impl Emulator {
         instruction: &Instruction,
         job: &mut Job,
     ) -> Result<Flow, Fault> {
-        if job.kind == JobKind::Process && !process::takes(instruction) {
+        let moves = is_motion(instruction);
+        if job.kind == JobKind::Process && (moves || !process::takes(instruction)) {
             return Err(Message::IllegalInstruction.into());
         }
         let waits = job.kind != JobKind::Process && needs_standing_arm(instruction);
         if self.arm.moving() && waits {
             return Ok(Flow::WhenStanding);
         }
-        if is_motion(instruction) {
+        if moves {
             return self.motion_after_motion(instruction, job);
         }
         let scope = self.scope();

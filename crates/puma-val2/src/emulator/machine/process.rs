@@ -6,8 +6,9 @@ use crate::emulator::language::lexer::Cursor;
 use crate::emulator::machine::job::{Job, JobKind, Wait};
 use crate::emulator::message::{Fault, Message};
 
-/// Returns `true` for an instruction that a process-control program may have: none that moves the
-/// arm or the hand, sets up a motion or a reaction, asks at the terminal, or has names of its own.
+/// Returns `true` for an instruction that a process-control program may have, motions aside: none
+/// that moves the hand, sets up a motion or a reaction, asks at the terminal, or has names of its
+/// own.
 pub(crate) fn takes(instruction: &Instruction) -> bool {
     use Instruction as I;
     let own_names = match instruction {
@@ -16,15 +17,7 @@ pub(crate) fn takes(instruction: &Instruction) -> bool {
     };
     let of_the_arm = matches!(
         instruction,
-        I::Move { .. }
-            | I::Appro { .. }
-            | I::Depart { .. }
-            | I::Drive(_)
-            | I::Draw(_)
-            | I::Align
-            | I::Ready
-            | I::Nest
-            | I::Hand { .. }
+        I::Hand { .. }
             | I::Grasp(..)
             | I::Posture(..)
             | I::Speed { .. }
