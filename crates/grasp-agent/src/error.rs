@@ -115,6 +115,9 @@ pub enum AgentError {
     /// A text is not a saved run, or its controller cannot be made again.
     #[error("this text is no saved run: {0}")]
     SavedRun(String),
+    /// Looks from which a camera cannot be calibrated.
+    #[error("calibration: {0}")]
+    Calibration(String),
     /// Settings cannot work.
     #[error("agent configuration: {0}")]
     Config(String),

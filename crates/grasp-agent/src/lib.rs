@@ -19,6 +19,8 @@
 //! * An [`Agent`] runs a controller and the modules around it on an [`Eye`] (a camera and a
 //!   [`Target`]) and a [`Manipulator`](puma_val2::Manipulator). It reports every [`RunEvent`]; an
 //!   [`EventLog`] keeps them, and a [`SavedRun`] can be replayed from its text alone.
+//! * A [`HandEye`] calibrates camera, lens, ball and joint zeros by looks at a resting ball. Its
+//!   [`Calibration`] gives each quantity with a standard error.
 //!
 //! # The state machine
 //!
@@ -59,6 +61,7 @@
 //! traits of `hough-heuristic` and `puma-val2`, and through closures.
 
 mod behaviour;
+mod calibration;
 mod checked;
 mod controller;
 mod controllers;
@@ -81,6 +84,7 @@ pub use behaviour::reward::{Reward, RewardTerm};
 pub use behaviour::space::StateSpace;
 pub use behaviour::spec::{BehaviourSpec, GoalInterval, JointSteps};
 pub use behaviour::task::BehaviourTask;
+pub use calibration::hand_eye::{Calibration, Estimate, HandEye};
 pub use controller::SavedController;
 pub use controller::{Controller, Decision, Feedback, GaveUp, Request};
 pub use controllers::hybrid::belief::{Belief, Prior};

@@ -95,6 +95,19 @@ impl CameraModel {
     /// Returns the outline of a ball with its centre at `p` in the camera frame: centre and mean
     /// semi-axis of the ellipse in which the image plane cuts the cone of rays that touch the ball.
     pub(crate) fn outline(&self, p: &Point3<f64>) -> Option<Features> {
+        let (scale, major, minor) = self.ellipse(p)?;
+        let features = Features::new(
+            self.centre[0] + scale * p.x,
+            self.centre[1] + scale * p.y,
+            0.5 * (major + minor),
+        );
+        (features.x.is_finite() && features.y.is_finite() && features.r.is_finite())
+            .then_some(features)
+    }
+
+    /// Returns the ellipse of [`CameraModel::outline`]: the factor from (`p.x`, `p.y`) to its
+    /// middle, from the principal point, and its semi-axes, the major one along that direction.
+    pub(crate) fn ellipse(&self, p: &Point3<f64>) -> Option<(f64, f64, f64)> {
         let depth2 = p.z * p.z;
         let tangent2 = depth2 - self.ball_radius * self.ball_radius;
         // The whole ball is in front of the lens.
@@ -108,13 +121,7 @@ impl CameraModel {
             * self.ball_radius
             * (distance2 - self.ball_radius * self.ball_radius).sqrt()
             / tangent2;
-        let features = Features::new(
-            self.centre[0] + scale * p.x,
-            self.centre[1] + scale * p.y,
-            0.5 * (major + minor),
-        );
-        (features.x.is_finite() && features.y.is_finite() && features.r.is_finite())
-            .then_some(features)
+        Some((scale, major, minor))
     }
 
     /// Inverts [`CameraModel::outline`].

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod arms;
+mod calibration;
 mod cell;
 mod endings;
 mod faults;
