@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use pipeline_sim::{Cell, Workspace};
 use plotters::coord::Shift;
 use plotters::prelude::{SeriesLabelPosition as Pos, *};
-use puma_val2::Joints;
+use puma_val2::{Joints, PumaParams};
 
 /// Size of each view, pixels; both show 1.8 m by 1.5 m.
 const VIEW: (u32, u32) = (600, 500);
@@ -130,7 +130,7 @@ fn view<'a>(
 
 /// Returns the lines that both views show: arm, hand, camera bracket, holder and the tool's way.
 fn arm_and_ball(cell: &Cell, joints: &Joints, path: &[Joints], eye: Point3<f64>) -> Vec<Line> {
-    let (params, [_, j2, ..]) = (&cell.params, joints.0);
+    let (params, [_, j2, ..]) = (PumaParams::unimation(), joints.0);
     let waist = Isometry3::rotation(Vector3::z() * joints.0[0]);
     let shoulder = waist * Point3::new(0.0, params.d2, 0.0);
     let elbow = waist * Point3::new(params.a2 * j2.cos(), params.d2, -params.a2 * j2.sin());
@@ -168,7 +168,7 @@ fn ring(workspace: &Workspace) -> Vec<Point3<f64>> {
 /// Returns the section of the workspace with the arm's plane, which passes the waist axis at the
 /// shoulder's offset, turned by `pan`.
 fn section(cell: &Cell, workspace: &Workspace, pan: f64) -> Vec<Point3<f64>> {
-    let (d2, (low, high)) = (cell.params.d2, workspace.height);
+    let (d2, (low, high)) = (PumaParams::unimation().d2, workspace.height);
     let along = |rho: f64| (rho * rho - d2 * d2).max(0.0).sqrt();
     let (near, far) = (along(workspace.rho.0), along(workspace.rho.1));
     let turn = Isometry3::rotation(Vector3::z() * pan);

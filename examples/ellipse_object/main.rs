@@ -22,7 +22,7 @@ use hough_heuristic::{Canny, CannyConfig, CurveSearch, CurveSearchConfig, Ellips
 use nalgebra::Vector3;
 use pipeline_sim::{MoveForm, Scene, Workspace};
 use puma_grasp::{Rig, RigParts};
-use puma_val2::Joints;
+use puma_val2::{Joints, PumaParams};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
@@ -129,7 +129,7 @@ fn run(options: &Options) -> Outcome {
         let (mut last, mut closed) = (None, None);
         let outline = Rc::clone(&features.outline);
         let mut eye = CameraEye::looking_for(&mut camera, &mut features);
-        let params = cell.get().params;
+        let params = PumaParams::unimation();
         let mut saved = SavedRun::before(&agent);
         let mut arm = Detour { arm, params };
         let end = agent.run(&mut eye, &mut arm, &mut *sensor, &mut |event| {
@@ -241,7 +241,7 @@ impl Target for Watched {
 
 /// Returns the angle of the jaws from straight across the egg, degrees.
 fn off_across(cell: &pipeline_sim::Cell, joints: &Joints, egg: &Egg) -> f64 {
-    let along_the_jaws = cell.params.wrist(joints).rotation * Vector3::y();
+    let along_the_jaws = cell.arm.wrist(joints).rotation * Vector3::y();
     let off = along_the_jaws.dot(&egg.axis()).abs().min(1.0).asin();
     off.to_degrees()
 }

@@ -202,7 +202,7 @@ impl TrialCell {
     #[must_use]
     pub fn without_bodies(mut self) -> Self {
         // Everything of the hand at the wrist centre, where no ball can be.
-        let at_the_wrist = -self.cell.params.d6;
+        let at_the_wrist = -self.cell.arm.flange();
         self.cell.hand = HandShape {
             tool: at_the_wrist,
             beyond_tool: 0.0,

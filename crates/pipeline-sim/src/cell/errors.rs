@@ -47,8 +47,9 @@ pub struct Errors {
     pub link_shift: [f64; 2],
     /// Offset of each link from the angle that its encoder reads, `JT1` first, radians.
     pub joint_zero: [f64; 6],
-    /// Turn of each link over that of its encoder. Turns count from the middle of the working
-    /// range, where the arm was adjusted (`JT2` -85, `JT3` 167.5 degrees, the others 0).
+    /// Turn of each link over that of its encoder. Turns count from where the arm was adjusted: the
+    /// middle of the working range of `JT1` to `JT3` (of the paper's cell 0, -85 and 167.5
+    /// degrees), 0 of the others.
     pub gear: [f64; 6],
     /// Fraction of the turn of `JT3` that `JT2` makes as well, and of that of `JT2` that `JT3`
     /// makes.
@@ -78,9 +79,6 @@ pub struct Errors {
     /// camera slips in its mount ([`Errors::slip_camera`]).
     pub slip: [f64; 2],
 }
-
-/// Middle of the working range, from which gears and drag count, degrees.
-const ADJUSTED_DEGREES: [f64; 6] = [0.0, -85.0, 167.5, 0.0, 0.0, 0.0];
 
 impl Errors {
     /// Angle of one count of each of the PUMA 560's encoders, degrees.
@@ -257,8 +255,9 @@ impl Errors {
         if !self.distortion.is_none() {
             cell.camera = cell.camera.with_distortion(self.distortion)?;
         }
-        cell.params.a2 += self.link_shift[0];
-        cell.params.d4 += self.link_shift[1];
+        if self.link_shift != [0.0; 2] {
+            cell.arm = cell.arm.lengthened(self.link_shift);
+        }
         // Shifted along the camera's own axes, then turned in place.
         let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), self.yaw)
             * Rotation3::from_axis_angle(&Vector3::x_axis(), self.pitch)
@@ -282,21 +281,24 @@ impl Errors {
         cell.mount *= Isometry3::from_parts(Translation3::new(shift, 0.0, 0.0), turn);
     }
 
-    /// Returns the angles of the links of an arm whose encoders, less the play, read `read`.
-    pub(crate) fn links(&self, read: &Joints) -> Joints {
+    /// Returns the angles of the links of the arm in `cell` whose encoders, less the play, read
+    /// `read`.
+    pub(crate) fn links(&self, cell: &Cell, read: &Joints) -> Joints {
         let (zero, gear, drag) = (&self.joint_zero, &self.gear, &self.drag);
         let off = zero.iter().chain(drag).copied().chain([self.sag]);
         if off.chain(gear.map(|gear| gear - 1.0)).all(|off| off == 0.0) {
             return *read;
         }
-        let from = Joints::from_degrees(ADJUSTED_DEGREES);
-        let turned = |i: usize| read.0[i] - from.0[i];
-        let geared = |i: usize| from.0[i] + gear[i] * turned(i) + zero[i];
+        let adjusted = |i: usize| match cell.limits[i] {
+            (low, high) if i < 3 => 0.5 * (low + high),
+            _ => 0.0,
+        };
+        let turned = |i: usize| read.0[i] - adjusted(i);
+        let geared = |i: usize| adjusted(i) + gear[i] * turned(i) + zero[i];
         let mut links = Joints(std::array::from_fn(geared));
         links.0[1] += drag[0] * turned(2);
         links.0[2] += drag[1] * turned(1);
-        // At JT2 = 0 the upper arm is level; positive angles lower it.
-        links.0[1] += self.sag * links.0[1].cos();
+        links.0[1] += self.sag * cell.arm.droop(&links);
         links
     }
 

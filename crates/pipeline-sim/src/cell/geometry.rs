@@ -1,8 +1,8 @@
 //! The cell: arm, camera, hand, ball and table, and the geometry between them.
 
 use hough_heuristic::{Circle, Features};
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion};
-use puma_val2::{Gripper, Joint, Joints, PumaParams};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use puma_val2::{Arm, Gripper, Joint, JointDelta, Joints, Kinematics, PumaParams};
 
 use crate::cell::ball::{Ball, Holder};
 use crate::cell::camera::Camera;
@@ -17,12 +17,12 @@ use crate::error::{QuantityError, SightError, finite, positive};
 /// are pure geometry: equal joints give equal answers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// Link lengths and joint ranges.
-    pub params: PumaParams,
+    /// Geometry of the arm.
+    pub arm: Arm,
     /// Camera on the hand.
     pub camera: Camera,
-    /// Pose of the camera frame (see [`Camera`]) in the hand frame, whose origin is the wrist
-    /// centre and whose z axis is the tool axis ([`PumaParams::wrist`]).
+    /// Pose of the camera frame (see [`Camera`]) in the hand frame ([`Arm::wrist`]); of a PUMA its
+    /// origin is the wrist centre. Its z axis is the tool axis.
     pub mount: Isometry3<f64>,
     /// Gripper and camera as bodies.
     pub hand: HandShape,
@@ -40,6 +40,8 @@ pub struct Cell {
     pub sight: SightRule,
     /// Range that the task keeps each joint in, radians (low, high), `JT1` first.
     pub limits: [(f64, f64); 6],
+    /// Pose with a ball at the goal; `JT4` to `JT6` stay like this while reaching.
+    pub reached: Joints,
 }
 
 impl Cell {
@@ -77,7 +79,7 @@ impl Cell {
             (-266.0, 266.0),
         ];
         Self {
-            params: PumaParams::unimation(),
+            arm: PumaParams::unimation().into(),
             camera: Camera::paper(),
             mount: Isometry3::from_parts(
                 Translation3::new(-0.060, 0.0045, 0.020),
@@ -91,6 +93,50 @@ impl Cell {
             held: None,
             sight: SightRule::default(),
             limits: limits.map(|(low, high)| (low.to_radians(), high.to_radians())),
+            reached: Joints::from_degrees([0.0, -57.0, 186.0, 0.0, 45.0, 0.0]),
+        }
+    }
+
+    /// Returns a cell of a UR5 with the paper's camera, a gripper of 100 mm, and `ball` on a holder
+    /// above a table 300 mm below the base. At zero the arm is stretched along -x.
+    pub fn ur5(ball: Ball) -> Self {
+        let paper = Self::paper(ball);
+        let arm = Arm::ur5();
+        // The paper's mount is in the frame of the wrist, 82.3 mm behind the flange, and `JT5` of a
+        // UR5 turns about -y of the hand.
+        let half = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
+        let behind = Isometry3::from_parts(Translation3::new(0.0, 0.0, -0.0823), half);
+        let mut hand = paper.hand;
+        hand.tool = 0.100;
+        Self {
+            arm,
+            mount: behind * paper.mount,
+            hand,
+            limits: arm.limits(),
+            reached: Joints::from_degrees([0.0, -45.0, 70.0, -80.0, -90.0, 0.0]),
+            ..paper
+        }
+    }
+
+    /// Returns a cell of a desk arm of the size of the SO-101 ([`Arm::so101`]) with a camera of 60
+    /// degrees above its hand, a gripper of 140 mm, and `ball` on a holder above a table 100 mm
+    /// below the base.
+    pub fn so101(ball: Ball) -> Self {
+        let paper = Self::paper(ball);
+        let arm = Arm::so101();
+        let camera = paper.camera;
+        let wide = 166.0 / 192.0 * f64::from(camera.size().0) / camera.focal_px();
+        let mut hand = paper.hand;
+        hand.tool = 0.140;
+        Self {
+            arm,
+            camera: camera.with_focal_factor(wide).unwrap_or(camera),
+            mount: Translation3::new(-0.040, 0.0, 0.020) * paper.mount.rotation,
+            hand,
+            table: -0.100,
+            limits: arm.limits(),
+            reached: Joints::from_degrees([0.0, 53.0, -33.0, 0.0, 60.0, 0.0]),
+            ..paper
         }
     }
 
@@ -103,7 +149,7 @@ impl Cell {
 
     /// Returns the pose of the camera frame in the world.
     pub fn camera_pose(&self, joints: &Joints) -> Isometry3<f64> {
-        self.params.wrist(joints) * self.mount
+        self.arm.wrist(joints) * self.mount
     }
 
     /// Returns the outline of the ball in the image, inside the frame or not; `None` where it has
@@ -146,18 +192,32 @@ impl Cell {
 
     /// Refuses a measure that the camera's pose depends on and that is not finite.
     fn check_measures(&self) -> Result<(), QuantityError> {
-        let (arm, mount) = (&self.params, &self.mount);
-        let [a, b, c] = mount.translation.vector.into();
-        let [i, j, k, w] = mount.rotation.coords.into();
-        for (quantity, value) in [
-            ("the arm's length a2 (m)", arm.a2),
-            ("the arm's length a3 (m)", arm.a3),
-            ("the arm's length d2 (m)", arm.d2),
-            ("the arm's length d4 (m)", arm.d4),
-            ("the arm's length d6 (m)", arm.d6),
+        let [a, b, c] = self.mount.translation.vector.into();
+        let [i, j, k, w] = self.mount.rotation.coords.into();
+        let lengths = match &self.arm {
+            Arm::Puma(arm) => [
+                ("the arm's length a2 (m)", arm.a2),
+                ("the arm's length a3 (m)", arm.a3),
+                ("the arm's length d2 (m)", arm.d2),
+                ("the arm's length d4 (m)", arm.d4),
+                ("the arm's length d6 (m)", arm.d6),
+            ],
+            Arm::Serial { axes, home, .. } => {
+                let points: f64 = axes.iter().map(|(p, v)| p.coords.sum() + v.sum()).sum();
+                let hand = home.translation.vector.sum();
+                [
+                    ("the first axis of the arm", axes[0].1.sum()),
+                    ("the axes of the arm", points),
+                    ("the place of the hand (m)", hand),
+                    ("the turn of the hand", home.rotation.coords.sum()),
+                    ("the last axis of the arm", axes[5].1.sum()),
+                ]
+            }
+        };
+        for (quantity, value) in lengths.into_iter().chain([
             ("the place of the camera's mount (m)", a + b + c),
             ("the rotation of the camera's mount", i + j + k + w),
-        ] {
+        ]) {
             finite(quantity, value)?;
         }
         Ok(())
@@ -173,7 +233,7 @@ impl Cell {
 
     /// Returns the point between the finger pads, world frame, metres.
     pub fn tool_point(&self, joints: &Joints) -> Point3<f64> {
-        self.params.wrist(joints) * Point3::new(0.0, 0.0, self.params.d6 + self.hand.tool)
+        self.arm.wrist(joints) * Point3::new(0.0, 0.0, self.arm.flange() + self.hand.tool)
     }
 
     /// Returns the distance from the tool point to the centre of the ball, metres.
@@ -184,6 +244,9 @@ impl Cell {
     /// Returns the angle of `JT5`, radians, that brings the tool point nearest to the ball while
     /// all other joints stay.
     pub fn grip_angle(&self, joints: &Joints) -> f64 {
+        if let Arm::Serial { .. } = self.arm {
+            return self.grip_angle_of_chain(joints);
+        }
         // Frame that JT5 turns in: the hand frame turned back by JT5 about the wrist's bending
         // axis. At JT5 = 0 the tool axis is the forearm's axis, and +JT5 turns z toward +x of the
         // hand at JT5 = 0.
@@ -191,10 +254,31 @@ impl Cell {
         straight.0[Joint::J5.index()] = 0.0;
         straight.0[Joint::J6.index()] = 0.0;
         let ball = self
-            .params
+            .arm
             .wrist(&straight)
             .inverse_transform_point(&self.ball.centre);
         ball.x.atan2(ball.z)
+    }
+
+    /// Returns [`Cell::grip_angle`] of any arm: the turn about the axis of `JT5` that brings the
+    /// direction of the tool point to that of the ball.
+    fn grip_angle_of_chain(&self, joints: &Joints) -> f64 {
+        const TURN: f64 = 0.01;
+        let at = |turn: f64| self.arm.wrist(&(*joints + JointDelta::of(Joint::J5, turn)));
+        let turned = at(TURN) * at(-TURN).inverse();
+        let Some(axis) = turned.rotation.axis() else {
+            return joints[Joint::J5];
+        };
+        // A point on the axis, from the shift of the small turn.
+        let shift = turned.translation.vector;
+        let half = 0.5 * turned.rotation.angle();
+        let foot = 0.5 * (shift + axis.cross(&shift) / half.tan());
+        let across = |point: Point3<f64>| {
+            let from = point.coords - foot;
+            from - axis.into_inner() * axis.dot(&from)
+        };
+        let (tool, ball) = (across(self.tool_point(joints)), across(self.ball.centre));
+        joints[Joint::J5] + axis.dot(&tool.cross(&ball)).atan2(tool.dot(&ball))
     }
 
     /// Returns `true` if all joints are within the working limits.
@@ -221,6 +305,9 @@ impl Cell {
     /// Returns the elbow-up pose, with `JT5` at `jt5_degrees` and `JT4` = `JT6` = 0, in which the
     /// ball shows the middle of the goal in y and r and lies in the middle between the jaws.
     ///
+    /// Of another arm than a PUMA it is the pose near [`Cell::reached`] in which the ball shows at
+    /// [`Cell::GOAL`].
+    ///
     /// # Errors
     /// [`SightError`]: a ball, an angle, or a measure of arm or mount that is not finite; a ball
     /// without size; a camera that cannot show the ball at the goal; a ball out of the arm's reach;
@@ -231,32 +318,35 @@ impl Cell {
         self.check_measures()?;
         positive("the radius of the ball (m)", self.ball.radius)?;
         let ball = self.ball.centre;
+        let Arm::Puma(params) = self.arm else {
+            return self.goal_pose_of_chain(jt5_degrees);
+        };
         // The ball's place in the hand is fixed, so forearm, hand and ball are one rigid link: a
         // two-link arm in the plane.
         let hand = Joints::from_degrees([0.0, 0.0, 0.0, 0.0, jt5_degrees, 0.0]);
         let goal = self
             .ball_showing(&hand, &Self::GOAL)
             .ok_or(SightError::NoView)?;
-        let wrist = self.params.wrist(&hand);
+        let wrist = params.wrist(&hand);
         let mut in_hand = wrist.inverse_transform_point(&goal);
         in_hand.y = 0.0;
-        let elbow = Point3::new(self.params.a2, self.params.d2, 0.0);
+        let elbow = Point3::new(params.a2, params.d2, 0.0);
         let link = wrist * in_hand - elbow;
         let (length, angle) = (link.x.hypot(link.z), link.z.atan2(link.x));
 
         let rho2 = ball.x * ball.x + ball.y * ball.y;
-        let forward2 = rho2 - self.params.d2 * self.params.d2;
+        let forward2 = rho2 - params.d2 * params.d2;
         if forward2.is_nan() || forward2 <= 0.0 {
             return Err(SightError::BesideWaist {
                 distance: rho2.sqrt(),
-                offset: self.params.d2.abs(),
+                offset: params.d2.abs(),
             });
         }
         let forward = forward2.sqrt();
-        let jt1 = ball.y.atan2(ball.x) - self.params.d2.atan2(forward);
+        let jt1 = ball.y.atan2(ball.x) - params.d2.atan2(forward);
         // Elevations above the horizon, VAL turning downward for positive JT2 and JT3.
         let distance2 = forward2 + ball.z * ball.z;
-        let a2 = self.params.a2;
+        let a2 = params.a2;
         let cos_bend = (distance2 - a2 * a2 - length * length) / (2.0 * a2 * length);
         if cos_bend.is_nan() || cos_bend.abs() > 1.0 {
             return Err(SightError::OutOfReach {
@@ -278,6 +368,11 @@ impl Cell {
             hand.0[4],
             0.0,
         ]);
+        self.in_limits(pose)
+    }
+
+    /// Returns a pose, or the first joint that is out of the working limits.
+    fn in_limits(&self, pose: Joints) -> Result<Joints, SightError> {
         match self.joint_out_of_limits(&pose) {
             None => Ok(pose),
             Some(joint) => Err(SightError::OutOfLimits {
@@ -289,10 +384,44 @@ impl Cell {
         }
     }
 
+    /// Returns [`Cell::goal_pose`] of any arm, by Newton's method in `JT1` to `JT3`.
+    fn goal_pose_of_chain(&self, jt5_degrees: f64) -> Result<Joints, SightError> {
+        let ball = self.ball.centre;
+        let mut pose = self.reached;
+        pose.0[4] = jt5_degrees.to_radians();
+        let wanted = self.ball_showing(&pose, &Self::GOAL);
+        let wanted = wanted.ok_or(SightError::NoView)?;
+        let wanted = self.camera_pose(&pose).inverse_transform_point(&wanted);
+        // The first joint turns the hand to the side of the ball.
+        let hand = self.camera_pose(&pose).translation.vector;
+        pose.0[0] += ball.y.atan2(ball.x) - hand.y.atan2(hand.x);
+        let off = |pose: &Joints| self.camera_pose(pose).inverse_transform_point(&ball) - wanted;
+        for _ in 0..50 {
+            let here = off(&pose);
+            if here.norm() < 1e-9 {
+                pose.0[0] = turned_near(pose.0[0], self.reached.0[0]);
+                return self.in_limits(pose);
+            }
+            let mut slope = Matrix3::zeros();
+            for (i, joint) in [Joint::J1, Joint::J2, Joint::J3].into_iter().enumerate() {
+                let there = off(&(pose + JointDelta::of(joint, 1e-6)));
+                slope.set_column(i, &((there - here) / 1e-6));
+            }
+            let Some(step) = slope.lu().solve(&here) else {
+                break;
+            };
+            let share = (0.3 / step.amax()).min(1.0);
+            for i in 0..3 {
+                pose.0[i] -= share * step[i];
+            }
+        }
+        Err(SightError::NoView)
+    }
+
     /// Returns `true` if [`Cell::goal_pose`] exists for the hand's angle while reaching
     /// ([`Cell::REACHING_JT5_DEGREES`]).
     pub(crate) fn reachable(&self) -> bool {
-        self.goal_pose(Self::REACHING_JT5_DEGREES).is_ok()
+        self.goal_pose(self.reached[Joint::J5].to_degrees()).is_ok()
     }
 
     /// Returns `true` if fingers, palm or camera are nearer to table, holder or ball than the
@@ -340,17 +469,17 @@ impl Cell {
 
     /// Returns fingers, palm and camera in the world frame. Fingers that hold the ball touch it.
     pub(crate) fn hand_bodies(&self, joints: &Joints) -> [Capsule; 4] {
-        let wrist = self.params.wrist(joints);
+        let wrist = self.arm.wrist(joints);
         let apart = match self.jaws {
             Gripper::Open => self.hand.half_opening,
             Gripper::Closed if self.held.is_some() => self.ball.radius + self.hand.finger_radius,
             Gripper::Closed => self.hand.finger_radius,
         };
-        let [left, right] = self.hand.fingers(self.params.d6, apart);
+        let [left, right] = self.hand.fingers(self.arm.flange(), apart);
         [
             left.moved(&wrist),
             right.moved(&wrist),
-            self.hand.palm(self.params.d6).moved(&wrist),
+            self.hand.palm(self.arm.flange()).moved(&wrist),
             self.hand.camera_body().moved(&(wrist * self.mount)),
         ]
     }

@@ -2,7 +2,7 @@
 
 use hough_heuristic::Features;
 use nalgebra::{Isometry3, Point3, Vector3};
-use puma_val2::{Gripper, Joints, PumaParams};
+use puma_val2::{Arm, Gripper, Joints, PumaParams};
 
 use crate::cell::ball::Holder;
 use crate::cell::geometry::Cell;
@@ -39,9 +39,9 @@ impl Cell {
         }
         let were_open = self.jaws == Gripper::Open;
         self.jaws = Gripper::Closed;
-        let wrist = self.params.wrist(joints);
+        let wrist = self.arm.wrist(joints);
         let ball = wrist.inverse_transform_point(&self.ball.centre);
-        let pads = self.params.d6 + self.hand.tool;
+        let pads = self.arm.flange() + self.hand.tool;
         let across = Vector3::new(ball.x, 0.0, ball.z - pads);
         let miss = across.norm();
         let gap = self.hand.half_opening - self.hand.finger_radius;
@@ -92,7 +92,7 @@ impl Cell {
     /// holder until they only touch.
     fn follow(&mut self, joints: &Joints) -> f64 {
         if let Some(place) = self.held {
-            self.ball.centre = self.params.wrist(joints) * place;
+            self.ball.centre = self.arm.wrist(joints) * place;
             return 0.0;
         }
         let start = self.ball.centre;
@@ -130,7 +130,7 @@ impl Cell {
         }
         // Too far away to meet: the wrist's path stays within half its length of the nearer end,
         // and the hand within its reach of the wrist.
-        let wrist_at = |joints: &Joints| self.params.wrist(joints).translation.vector;
+        let wrist_at = |joints: &Joints| self.arm.wrist(joints).translation.vector;
         let (start, end) = (wrist_at(from), wrist_at(to));
         let bodies = self.hand_bodies(from);
         let reach = |body: &Capsule| {
@@ -138,10 +138,25 @@ impl Cell {
             ends[0].max(ends[1]) + body.radius
         };
         let hand = bodies.iter().map(reach).fold(0.0, f64::max);
-        let PumaParams { a2, a3, d2, d4, .. } = self.params;
-        let arm = a2.abs() + d2.abs() + a3.hypot(d4);
+        // Length of the arm to the wrist, and number of the joints that move the wrist.
+        let (arm, moving) = match &self.arm {
+            Arm::Puma(PumaParams { a2, a3, d2, d4, .. }) => {
+                (a2.abs() + d2.abs() + a3.hypot(*d4), 3)
+            }
+            Arm::Serial { axes, home, .. } => {
+                let points = axes.iter().map(|(point, _)| point.coords);
+                let points: Vec<_> = points.chain([home.translation.vector]).collect();
+                (
+                    points
+                        .windows(2)
+                        .map(|ends| (ends[1] - ends[0]).norm())
+                        .sum(),
+                    6,
+                )
+            }
+        };
         let turns: [f64; 6] = std::array::from_fn(|i| (to.0[i] - from.0[i]).abs());
-        let way: f64 = turns[..3].iter().sum();
+        let way: f64 = turns[..moving].iter().sum();
         let ball = self.ball.centre.coords;
         let nearer = (ball - start).norm().min((ball - end).norm());
         if nearer > hand + self.ball.radius + 0.5 * arm * way {

@@ -1,5 +1,7 @@
 //! The region in which balls lie, and the poses from which the arm searches for them.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Point3, Vector3};
 use puma_val2::Joints;
 use rand::{Rng, RngExt};
@@ -23,6 +25,8 @@ pub struct Workspace {
     pub search_pans: [f64; 6],
     /// `JT2` and `JT3` of the search poses, radians.
     pub search_elbow: (f64, f64),
+    /// `JT4`, `JT5` and `JT6` of the search poses, radians.
+    pub search_wrist: [f64; 3],
 }
 
 impl Workspace {
@@ -36,14 +40,44 @@ impl Workspace {
             height: (-0.200, 0.050),
             search_pans: [-75.0_f64, -50.0, -25.0, 0.0, 25.0, 50.0].map(f64::to_radians),
             search_elbow: (-110_f64.to_radians(), 210_f64.to_radians()),
+            search_wrist: [0.0, Cell::REACHING_JT5_DEGREES.to_radians(), 0.0],
+        }
+    }
+
+    /// Returns the workspace of [`Cell::ur5`]: 350..600 mm from the base axis, azimuth 120..240
+    /// degrees, 0..50 mm above the base; search poses (p, -85, 75, -80, -90, 0) with p from -50 to
+    /// 50 in steps of 20 degrees.
+    pub fn ur5() -> Self {
+        Self {
+            rho: (0.350, 0.600),
+            azimuth: (120_f64.to_radians(), 240_f64.to_radians()),
+            height: (0.0, 0.050),
+            search_pans: [-50.0_f64, -30.0, -10.0, 10.0, 30.0, 50.0].map(f64::to_radians),
+            search_elbow: (-85_f64.to_radians(), 75_f64.to_radians()),
+            search_wrist: [-80.0_f64, -90.0, 0.0].map(f64::to_radians),
+        }
+    }
+
+    /// Returns the workspace of [`Cell::so101`]: 200..340 mm from the base axis, azimuth -60..60
+    /// degrees, 0..30 mm above the base; search poses (p, -30, 30, 0, 60, 0) with p from -60 to 60
+    /// in steps of 24 degrees.
+    pub fn so101() -> Self {
+        Self {
+            rho: (0.200, 0.340),
+            azimuth: (-60_f64.to_radians(), 60_f64.to_radians()),
+            height: (0.0, 0.030),
+            search_pans: [-60.0_f64, -36.0, -12.0, 12.0, 36.0, 60.0].map(f64::to_radians),
+            search_elbow: (-30_f64.to_radians(), 30_f64.to_radians()),
+            search_wrist: [0.0, 60_f64.to_radians(), 0.0],
         }
     }
 
     /// Returns the six starting poses of the target search (section 2.2 of the paper).
     pub fn search_poses(&self) -> [Joints; 6] {
-        let jt5 = Cell::REACHING_JT5_DEGREES.to_radians();
+        let (jt2, jt3) = self.search_elbow;
+        let [jt4, jt5, jt6] = self.search_wrist;
         self.search_pans
-            .map(|pan| Joints([pan, self.search_elbow.0, self.search_elbow.1, 0.0, jt5, 0.0]))
+            .map(|pan| Joints([pan, jt2, jt3, jt4, jt5, jt6]))
     }
 
     /// Checks that balls can lie in this workspace.
@@ -60,7 +94,8 @@ impl Workspace {
         ascending("the azimuth (rad)", self.azimuth)?;
         ascending("the height (m)", self.height)?;
         let elbow = [self.search_elbow.0, self.search_elbow.1];
-        let mut angles = self.search_pans.into_iter().chain(elbow);
+        let angles = self.search_pans.into_iter().chain(elbow);
+        let mut angles = angles.chain(self.search_wrist);
         angles.try_for_each(|angle| finite("an angle of the search poses (rad)", angle))
     }
 
@@ -101,8 +136,10 @@ impl Workspace {
     /// Returns `true` if a place is inside the workspace.
     pub fn contains(&self, place: &Point3<f64>) -> bool {
         let within = |range: (f64, f64), value: f64| (range.0..=range.1).contains(&value);
+        let from = self.azimuth.0;
+        let azimuth = from + (place.y.atan2(place.x) - from).rem_euclid(TAU);
         within(self.rho, place.x.hypot(place.y))
-            && within(self.azimuth, place.y.atan2(place.x))
+            && within(self.azimuth, azimuth)
             && within(self.height, place.z)
     }
 

@@ -121,7 +121,7 @@ impl CellRecipe {
             };
             let seen = || cell.features(&joints).is_ok_and(|f| f.r > 6.0);
             let wanted = if self.empty { gone() } else { seen() };
-            if wanted && cell.params.check(&joints).is_ok() {
+            if wanted && cell.arm.check(&joints).is_ok() {
                 break joints;
             }
         };

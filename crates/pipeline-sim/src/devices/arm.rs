@@ -32,7 +32,7 @@ impl SimulatedArm {
     /// # Errors
     /// [`ArmError::JointLimit`] or [`ArmError::NotFinite`] if it cannot stand there.
     pub fn new(cell: SharedCell, joints: Joints) -> Result<Self, ArmError> {
-        cell.with(|cell| cell.params.check(&joints))?;
+        cell.with(|cell| cell.arm.check(&joints))?;
         let mut drive = Drive {
             read: joints,
             driven: joints,
@@ -91,7 +91,7 @@ impl Manipulator for SimulatedArm {
     }
 
     fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
-        self.cell.with(|cell| cell.params.check(&target))?;
+        self.cell.with(|cell| cell.arm.check(&target))?;
         let from = self.links();
         let read = {
             let mut drive = self.drive();

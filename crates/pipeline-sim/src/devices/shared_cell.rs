@@ -75,7 +75,8 @@ impl SharedCell {
     pub fn links(&self, reported: &Joints) -> Joints {
         let state = self.lock();
         let driven = |i: usize| state.stuck[i].unwrap_or(reported.0[i]);
-        state.errors.links(&Joints(std::array::from_fn(driven)))
+        let driven = Joints(std::array::from_fn(driven));
+        state.errors.links(&state.cell, &driven)
     }
 
     /// Returns the target of a move that joints with stiction really go to, and remembers the

@@ -3,7 +3,7 @@
 use hough_heuristic::Features;
 use nalgebra::{Point3, Vector3};
 use pipeline_sim::{Ball, Cell, Grasp, SightError, Workspace};
-use puma_val2::{Joint, JointDelta, Joints};
+use puma_val2::{Arm, Joint, JointDelta, Joints, PumaParams};
 
 use crate::{at_goal, rng};
 
@@ -237,7 +237,7 @@ fn finger_sensors_respond_on_their_own_side() {
         let mut near = cell;
         // Two millimetres short of the finger on this side.
         let gap = cell.hand.half_opening - cell.hand.finger_radius - cell.ball.radius - 0.002;
-        near.ball.centre += cell.params.wrist(&grip) * Vector3::y() * (side * gap);
+        near.ball.centre += cell.arm.wrist(&grip) * Vector3::y() * (side * gap);
         assert_eq!(near.proximity_pair(&grip), expected, "{side}");
         assert!(near.proximity(&grip));
     }
@@ -261,7 +261,7 @@ fn unreachable_goals_are_refused_with_the_reason() {
         }),
         ("y coordinate", |c| c.ball.centre.y = f64::NAN),
         ("mount", |c| c.mount.translation.vector.x = f64::NAN),
-        ("a2", |c| c.params.a2 = f64::NAN),
+        ("a2", |c| c.arm = without_upper_arm()),
         ("radius of the ball", |c| c.ball.radius = f64::NAN),
         ("radius of the ball", |c| c.ball.radius = -0.02),
         ("radius of the ball", |c| c.ball.radius = 0.0),
@@ -273,16 +273,54 @@ fn unreachable_goals_are_refused_with_the_reason() {
     assert!(refused(f64::INFINITY, |_| ()).contains("JT5"));
 }
 
+fn without_upper_arm() -> Arm {
+    let mut params = PumaParams::unimation();
+    params.a2 = f64::NAN;
+    params.into()
+}
+
 #[test]
 fn measures_that_are_not_finite_are_named() {
     let (cell, pose) = at_goal();
     let (mut mount, mut arm, mut rule) = (cell, cell, cell);
     mount.mount.translation.vector.x = f64::NAN;
-    arm.params.a2 = f64::NAN;
+    arm.arm = without_upper_arm();
     rule.sight.min_share = f64::NAN;
     for (wrong, named) in [(mount, "mount"), (arm, "a2"), (rule, "fraction")] {
         let error = wrong.features(&pose).expect_err("no number").to_string();
         assert!(error.contains(named), "{error}");
+    }
+}
+
+#[test]
+fn cells_of_other_arms_show_balls_reach_them_and_grip_by_jt5() {
+    let rng = &mut rng(3);
+    for (cell, workspace) in [
+        (Cell::ur5(Ball::at(-0.5, 0.0, 0.0)), Workspace::ur5()),
+        (Cell::so101(Ball::at(0.3, 0.0, 0.0)), Workspace::so101()),
+    ] {
+        let mut reached = 0;
+        for _ in 0..20 {
+            let (ball, _) = workspace.sample_seen_ball(&cell, rng).expect("in view");
+            assert!(workspace.contains(&ball.centre), "{ball:?}");
+            let cell = Cell { ball, ..cell };
+            let Ok(pose) = cell.goal_pose(cell.reached[Joint::J5].to_degrees()) else {
+                continue;
+            };
+            reached += 1;
+            let seen = cell.features(&pose).expect("in view");
+            let off = [
+                seen.x - Cell::GOAL.x,
+                seen.y - Cell::GOAL.y,
+                seen.r - Cell::GOAL.r,
+            ];
+            assert!(off.iter().all(|off| off.abs() < 1e-3), "{seen:?}");
+            let mut grip = pose;
+            grip.0[4] = cell.grip_angle(&pose);
+            let better = |turn: f64| cell.grip_miss(&(grip + JointDelta::of(Joint::J5, turn)));
+            assert!(better(0.0) <= better(0.01).min(better(-0.01)), "{grip}");
+        }
+        assert!(reached >= 15, "{reached} of 20");
     }
 }
 

@@ -60,7 +60,7 @@ fn grasp_beside_the_ball_pushes_it_or_misses() {
         // The hand stands short of the ball or beyond it, along the tool axis: by construction the
         // ball is between the jaws.
         let mut off = cell;
-        let axis = off.params.wrist(&grip) * Vector3::z();
+        let axis = off.arm.wrist(&grip) * Vector3::z();
         off.ball.centre += axis * (f64::from(mm) / 1000.0);
         let before = off.ball.centre;
         let moved = |cell: &Cell| (cell.ball.centre - before).norm();
@@ -95,7 +95,7 @@ fn pads_that_slide_off_leave_the_ball_where_they_miss_it() {
     ] {
         let mut off = cell;
         let grip = goal + swing();
-        let level = off.params.wrist(&grip) * Vector3::x();
+        let level = off.arm.wrist(&grip) * Vector3::x();
         let level = Vector3::new(level.x, level.y, 0.0).normalize();
         off.ball.centre += Vector3::z() * up + level * ahead;
         let before = off.ball.centre;
@@ -108,10 +108,10 @@ fn pads_that_slide_off_leave_the_ball_where_they_miss_it() {
             "along the table"
         );
         let ball = off
-            .params
+            .arm
             .wrist(&grip)
             .inverse_transform_point(&off.ball.centre);
-        let miss = ball.x.hypot(ball.z - off.params.d6 - off.hand.tool);
+        let miss = ball.x.hypot(ball.z - off.arm.flange() - off.hand.tool);
         let touching = off.ball.radius + off.hand.finger_radius;
         assert!((miss - touching).abs() < 1e-9, "{up} {ahead}: {miss}");
     }
@@ -162,9 +162,9 @@ fn ball_off_its_holder_is_pushed_without_it() {
             "{degrees}: {apart}"
         );
         // A finger meets it from the side.
-        let reach = aside.params.d6 + aside.hand.tool - 0.02;
+        let reach = aside.arm.flange() + aside.hand.tool - 0.02;
         let finger = Point3::new(0.0, aside.hand.half_opening, reach);
-        aside.ball.centre = aside.params.wrist(&there) * finger + Vector3::new(0.01, 0.0, 0.0);
+        aside.ball.centre = aside.arm.wrist(&there) * finger + Vector3::new(0.01, 0.0, 0.0);
         assert!(aside.sweep(&there, &there) > 0.005);
         assert_eq!(aside.holder, Some(holder), "the holder stays where it is");
     }
@@ -226,9 +226,9 @@ fn long_hand_meets_the_ball_on_its_way() {
         .goal_pose(Cell::REACHING_JT5_DEGREES)
         .expect("within reach");
     cell.hand.tool = 0.5;
-    let wrist = cell.params.wrist(&goal);
+    let wrist = cell.arm.wrist(&goal);
     let turned = |degrees: f64| goal + JointDelta::from_degrees([degrees, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    cell.ball.centre = wrist * Point3::new(0.0, 0.0, cell.params.d6 + 0.45);
+    cell.ball.centre = wrist * Point3::new(0.0, 0.0, cell.arm.flange() + 0.45);
     cell.holder = None;
     cell.table = -1.0;
     let ball = cell.ball.centre;

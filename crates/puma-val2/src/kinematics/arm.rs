@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use crate::error::ArmError;
 use crate::joints::{Joint, Joints};
 use crate::kinematics::params::PumaParams;
+use crate::limits::{self, JointRange};
 
 /// Forward kinematics of an arm with up to six turning joints.
 ///
@@ -101,6 +102,66 @@ impl Arm {
         match self {
             Self::Puma(params) => params.d6,
             Self::Serial { .. } => 0.0,
+        }
+    }
+
+    /// Checks that every angle is finite and within its range.
+    ///
+    /// # Errors
+    /// [`ArmError::NotFinite`] or [`ArmError::JointLimit`] for the first joint that fails.
+    pub fn check(&self, joints: &Joints) -> Result<(), ArmError> {
+        let ranges = match self {
+            Self::Puma(params) => params.ranges,
+            Self::Serial { limits, .. } => limits.map(|(min, max)| JointRange {
+                min,
+                max,
+                speed: f64::INFINITY,
+            }),
+        };
+        limits::check(&ranges, joints)
+    }
+
+    /// Returns the arm with upper arm and forearm longer by these lengths, metres. Of a chain the
+    /// upper arm ends on the axis of `JT3`, the forearm at the hand.
+    #[must_use]
+    pub fn lengthened(mut self, [upper, fore]: [f64; 2]) -> Self {
+        match &mut self {
+            Self::Puma(params) => {
+                params.a2 += upper;
+                params.d4 += fore;
+            }
+            Self::Serial { axes, home, .. } => {
+                let along = |from: Point3<f64>, to: Point3<f64>, (_, axis): (_, Vector3<f64>)| {
+                    let link = to - from;
+                    let across = link - axis * axis.dot(&link);
+                    across.try_normalize(1e-9).unwrap_or_default()
+                };
+                let end = Point3::from(home.translation.vector);
+                let upper = along(axes[1].0, axes[2].0, axes[1]) * upper;
+                let fore = along(axes[2].0, end, axes[2]) * fore;
+                for (i, (point, _)) in axes.iter_mut().enumerate().skip(2) {
+                    *point += if i > 2 { upper + fore } else { upper };
+                }
+                home.translation.vector += upper + fore;
+            }
+        }
+        self
+    }
+
+    /// Returns the turn of `JT2` per unit of sag: the horizontal share of the upper arm, with the
+    /// sign of the turn that lowers it.
+    pub fn droop(&self, joints: &Joints) -> f64 {
+        match self {
+            // At JT2 = 0 the upper arm is level; positive angles lower it.
+            Self::Puma(_) => joints.0[1].cos(),
+            Self::Serial { axes, .. } => {
+                let waist = UnitQuaternion::from_scaled_axis(axes[0].1 * joints.0[0]);
+                let shoulder = UnitQuaternion::from_scaled_axis(axes[1].1 * joints.0[1]);
+                let link = waist * shoulder * (axes[2].0 - axes[1].0);
+                let axis = waist * axes[1].1;
+                let across = link - axis * axis.dot(&link);
+                -axis.cross(&across).z / across.norm().max(1e-9)
+            }
         }
     }
 
@@ -270,6 +331,20 @@ mod tests {
         assert!((hand * Point3::origin() - expected).norm() < 1e-12);
         assert!((hand * Vector3::z() + Vector3::z()).norm() < 1e-12);
         assert_eq!(Arm::of(&arm).unwrap().limits(), arm.limits());
+    }
+
+    #[test]
+    fn a_chain_is_lengthened_and_droops_like_the_puma_it_was_read_off() {
+        let puma = Arm::from(PumaParams::unimation());
+        let read = Arm::of(&puma).unwrap();
+        for k in 0..20 {
+            let joints = Joints(std::array::from_fn(|i| (k * (i + 3)) as f64 % 5.3 - 2.5));
+            assert!((puma.droop(&joints) - read.droop(&joints)).abs() < 1e-12);
+            let longer = [puma, read].map(|arm| arm.lengthened([0.02, 0.0]).forward(&joints));
+            assert!(off(&longer[0], &longer[1]) < 1e-12);
+        }
+        let far = Joints::from_degrees([0.0, 170.0, 0.0, 0.0, 0.0, 0.0]);
+        assert!(Arm::so101().check(&far).is_err() && Arm::ur5().check(&far).is_ok());
     }
 
     struct Odd(fn(&Joints) -> Isometry3<f64>);
