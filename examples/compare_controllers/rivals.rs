@@ -18,7 +18,8 @@ use crate::{Options, seed_of};
 
 /// A controller in the comparison.
 pub(crate) enum Rival {
-    Servo(Law, f64),
+    /// A law with its gain, and that far from the goal with the slope between them.
+    Servo(Law, f64, Option<[f64; 2]>),
     Learned(Box<Learned>),
     Untaught,
     /// The hybrid, which learns each cell first.
@@ -29,10 +30,15 @@ impl Rival {
     /// Makes the controller for the taught goal if there is one.
     pub(crate) fn controller(&self, goal: Option<&TaughtGoal>) -> Box<dyn Controller> {
         match (self, goal) {
-            (Self::Servo(law, gain), _) => {
-                let paper = ServoSettings::paper().with_gain(*gain);
-                let goal = goal.map_or(paper.goal, TaughtGoal::features);
-                Box::new(Servo::new(*law, ServoSettings { goal, ..paper }))
+            (Self::Servo(law, gain, adaptive), _) => {
+                let paper = ServoSettings::paper();
+                let settings = ServoSettings {
+                    goal: goal.map_or(paper.goal, TaughtGoal::features),
+                    gain: *gain,
+                    adaptive: *adaptive,
+                    ..paper
+                };
+                Box::new(Servo::new(*law, settings))
             }
             (Self::Learned(learned), None) => learned.clone(),
             (Self::Learned(learned), Some(goal)) => Box::new((**learned).clone().shown(goal)),
@@ -50,12 +56,22 @@ pub(crate) fn rivals(options: &Options) -> Outcome<Vec<(&'static str, Rival)>> {
         ("position-based, gain 0.5", Law::PositionBased, 0.5),
         ("image-based goal J, gain 0.5", Law::ImageBasedAtGoal, 0.5),
         ("image-based current J, gain 0.5", Law::ImageBased, 0.5),
-        ("fuzzy, gain 1", Law::Fuzzy, 1.0),
-        ("fuzzy, gain 0.7", Law::Fuzzy, 0.7),
-        ("fuzzy, gain 0.5", Law::Fuzzy, 0.5),
+        ("image-based sphere, gain 1", Law::Sphere, 1.0),
+        ("image-based sphere, gain 0.5", Law::Sphere, 0.5),
+        ("image-based sphere, adaptive", Law::Sphere, 1.0),
+        ("Broyden, gain 1", Law::Broyden, 1.0),
+        ("Broyden, gain 0.5", Law::Broyden, 0.5),
+        ("gain-scheduled, gain 1", Law::GainScheduled, 1.0),
+        ("gain-scheduled, gain 0.7", Law::GainScheduled, 0.7),
+        ("gain-scheduled, gain 0.5", Law::GainScheduled, 0.5),
+        ("fuzzy rules, gain 1", Law::FuzzyRules, 1.0),
+        ("fuzzy rules, gain 0.7", Law::FuzzyRules, 0.7),
         ("look-ahead", Law::LookAhead, 1.0),
     ];
-    let servos = servos.map(|(name, law, gain)| (name, Rival::Servo(law, gain)));
+    let servos = servos.map(|(name, law, gain)| {
+        let adaptive = name.ends_with("adaptive").then_some([0.4, 1.0]);
+        (name, Rival::Servo(law, gain, adaptive))
+    });
     let learned = learned(options)?.into_iter();
     let learned = learned.map(|(name, learned)| (name, Rival::Learned(Box::new(learned))));
     let hybrids = [

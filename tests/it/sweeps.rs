@@ -18,7 +18,7 @@ fn sweep(out: &Path, arguments: &[&str]) -> Option<String> {
             "--levels",
             "moderate,heavy",
         ])
-        .args(["--only", "fuzzy", "--out"])
+        .args(["--only", "gain-scheduled", "--out"])
         .arg(out)
         .args(arguments);
     Some(output(&mut compare).1)

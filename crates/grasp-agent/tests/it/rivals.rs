@@ -16,7 +16,10 @@ fn every_rival_reaches_the_ball_with_the_right_model() {
         (5, ServoLaw::PositionBased),
         (12, ServoLaw::ImageBasedAtGoal),
         (12, ServoLaw::ImageBased),
-        (12, ServoLaw::Fuzzy),
+        (8, ServoLaw::Sphere),
+        (8, ServoLaw::Broyden),
+        (12, ServoLaw::GainScheduled),
+        (20, ServoLaw::FuzzyRules),
         (20, ServoLaw::LookAhead),
     ];
     for (most, law) in rivals {

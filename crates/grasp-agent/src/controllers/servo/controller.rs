@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::controller::SavedController;
 use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
-use crate::controllers::servo::fuzzy::Rules;
+use crate::controllers::servo::fuzzy;
+use crate::controllers::servo::gain_schedule::Schedule;
 use crate::controllers::servo::look_ahead::LookAhead;
 use crate::controllers::servo::settings::ServoSettings;
 use crate::percept::Sighting;
@@ -23,13 +24,22 @@ pub enum ServoLaw {
     /// Image-based visual servoing with the Jacobian at [`ServoSettings::GOAL_POSE`], which is
     /// constant.
     ImageBasedAtGoal,
-    /// Fuzzy control of the Takagi-Sugeno kind, the paper's "alternative AI method" (section 1).
-    ///
-    /// The radius is *tiny*, *small*, *right* or *large*, in triangles that overlap. Each of them
-    /// has its own linear rule from the errors in x, y and 1/r to joint turns, and the rules act in
-    /// proportion to the degree to which their condition holds. A second set of rules gates the
-    /// approach: the farther the ball is from its line in the image, the less it is approached.
-    Fuzzy,
+    /// Image-based visual servoing on the features of a sphere, (x/r, y/r, 1/r), in which the
+    /// distance is linear (Chaumette 1990), with their Jacobian at [`ServoSettings::GOAL_POSE`].
+    Sphere,
+    /// The features of [`ServoLaw::Sphere`] with a Jacobian that Broyden's rank-one update
+    /// corrects by each move (Jägersand, Fuentes, Nelson 1997). It begins each run anew.
+    Broyden,
+    /// Gain-scheduled image-based servoing. The radius is *tiny*, *small*, *right* or *large*, in
+    /// triangles that overlap. Each of them has its own linear law from the errors in x, y and 1/r
+    /// to joint turns, of the model's Jacobian there, and the laws are blended by these degrees.
+    /// The farther the ball is from its line in the image, the less it is approached.
+    #[serde(alias = "Fuzzy")]
+    GainScheduled,
+    /// Fuzzy control by a rule base, the paper's "alternative AI method" (section 1): triangular
+    /// sets of the errors in x and y and of the distance, and a table of 20 rules for each joint,
+    /// with Sugeno's inference of order 0. The camera model is not used.
+    FuzzyRules,
     /// Look-ahead by one move: tries all 9 x 81 moves of the paper's behaviours in the camera model
     /// and makes the one after which the ball would be nearest to the goal. Gain and step limits
     /// are not used.
@@ -62,21 +72,44 @@ enum State {
     None,
     /// Jacobian at the goal pose, if there is one.
     Jacobian(Option<Matrix3<f64>>),
-    Rules(Rules),
+    /// Jacobian at the goal pose, and the present one with the last pose and features of a run.
+    Broyden(Option<Matrix3<f64>>, Option<Secant>),
+    Schedule(Schedule),
     LookAhead(LookAhead),
+}
+
+/// A Jacobian that follows what is seen.
+#[derive(Clone, Copy, Debug)]
+struct Secant {
+    jacobian: Matrix3<f64>,
+    joints: Joints,
+    features: Vector3<f64>,
+}
+
+impl Secant {
+    /// Takes the last move into the Jacobian. Small moves, which noise outweighs, count less.
+    fn learned(&self, joints: &Joints, features: Vector3<f64>) -> Matrix3<f64> {
+        const SMALL: f64 = 0.02;
+        let moved = Vector3::from_fn(|i, _| joints.0[i] - self.joints.0[i]);
+        let unforeseen = features - self.features - self.jacobian * moved;
+        self.jacobian + unforeseen * moved.transpose() / (moved.norm_squared() + SMALL * SMALL)
+    }
 }
 
 impl Servo {
     /// Creates a servo controller.
     pub fn new(law: ServoLaw, settings: ServoSettings) -> Self {
+        let at_goal = || {
+            let pose = Joints::from_degrees(ServoSettings::GOAL_POSE);
+            let ball = settings.model.locate(&pose, &settings.goal)?;
+            settings.model.image_jacobian(&pose, &ball)
+        };
         let state = match law {
-            ServoLaw::PositionBased | ServoLaw::ImageBased => State::None,
-            ServoLaw::ImageBasedAtGoal => {
-                let pose = Joints::from_degrees(ServoSettings::GOAL_POSE);
-                let ball = settings.model.locate(&pose, &settings.goal);
-                State::Jacobian(ball.and_then(|ball| settings.model.image_jacobian(&pose, &ball)))
-            }
-            ServoLaw::Fuzzy => State::Rules(Rules::new(&settings)),
+            ServoLaw::PositionBased | ServoLaw::ImageBased | ServoLaw::FuzzyRules => State::None,
+            ServoLaw::ImageBasedAtGoal => State::Jacobian(at_goal()),
+            ServoLaw::Sphere => State::Jacobian(at_goal().map(|j| settings.by_sphere(&j))),
+            ServoLaw::Broyden => State::Broyden(at_goal().map(|j| settings.by_sphere(&j)), None),
+            ServoLaw::GainScheduled => State::Schedule(Schedule::new(&settings)),
             ServoLaw::LookAhead => State::LookAhead(LookAhead::new()),
         };
         Self {
@@ -87,26 +120,44 @@ impl Servo {
         }
     }
 
-    /// Returns the turns of `JT1` to `JT3` that remove the share `gain` of the error.
-    fn wanted(&self, ball: &Sighting, joints: &Joints) -> Option<[f64; 3]> {
-        let ServoSettings {
-            model, goal, gain, ..
-        } = &self.settings;
+    /// Returns the turns of `JT1` to `JT3` that remove the share of the error that the gain says.
+    fn wanted(&mut self, ball: &Sighting, joints: &Joints) -> Option<[f64; 3]> {
+        let ServoSettings { model, goal, .. } = &self.settings;
         let seen = ball.features;
-        let jacobian = match &self.state {
-            State::Rules(rules) => return rules.turns(&self.settings, &seen),
-            State::Jacobian(jacobian) => *jacobian,
+        let error = match self.law {
+            ServoLaw::Sphere | ServoLaw::Broyden => {
+                self.settings.sphere(goal) - self.settings.sphere(&seen)
+            }
+            _ => Vector3::new(goal.x - seen.x, goal.y - seen.y, goal.r - seen.r),
+        };
+        let whole = match &mut self.state {
+            State::Schedule(schedule) => schedule.turns(&self.settings, &seen)?,
+            State::Jacobian(jacobian) => turns(&(*jacobian)?, &error)?,
+            State::Broyden(begun, secant) => {
+                let features = self.settings.sphere(&seen);
+                let jacobian = match secant {
+                    Some(secant) => secant.learned(joints, features),
+                    None => (*begun)?,
+                };
+                *secant = Some(Secant {
+                    jacobian,
+                    joints: *joints,
+                    features,
+                });
+                turns(&jacobian, &error)?
+            }
+            _ if self.law == ServoLaw::FuzzyRules => fuzzy::turns(goal, &seen)?,
             _ => {
                 let place = model.locate(joints, &seen)?;
                 if self.law == ServoLaw::PositionBased {
                     let (target, _) = model.pose_showing(&place, goal, joints)?;
-                    return Some(std::array::from_fn(|i| gain * (target.0[i] - joints.0[i])));
+                    Vector3::from_fn(|i, _| target.0[i] - joints.0[i])
+                } else {
+                    turns(&model.image_jacobian(joints, &place)?, &error)?
                 }
-                model.image_jacobian(joints, &place)
             }
         };
-        let error = Vector3::new(goal.x - seen.x, goal.y - seen.y, goal.r - seen.r);
-        Some((turns(&jacobian?, &error)? * *gain).into())
+        Some((whole * self.settings.gain_at(error.amax() / goal.r)).into())
     }
 }
 
@@ -144,8 +195,10 @@ impl Controller for Servo {
             Feedback::Lost | Feedback::TakenBack => (0.5 * self.boldness).max(1.0 / 64.0),
             _ => self.boldness,
         };
-        if let State::LookAhead(look_ahead) = &mut self.state {
-            look_ahead.notice(feedback);
+        match (&mut self.state, feedback) {
+            (State::LookAhead(look_ahead), _) => look_ahead.notice(feedback),
+            (State::Broyden(_, secant), Feedback::Begin) => *secant = None,
+            _ => {}
         }
     }
 
@@ -154,7 +207,10 @@ impl Controller for Servo {
             ServoLaw::PositionBased => "position-based",
             ServoLaw::ImageBased => "image-based, current J",
             ServoLaw::ImageBasedAtGoal => "image-based, goal J",
-            ServoLaw::Fuzzy => "fuzzy",
+            ServoLaw::Sphere => "image-based, sphere",
+            ServoLaw::Broyden => "Broyden",
+            ServoLaw::GainScheduled => "gain-scheduled",
+            ServoLaw::FuzzyRules => "fuzzy rules",
             ServoLaw::LookAhead => "look-ahead",
         }
     }

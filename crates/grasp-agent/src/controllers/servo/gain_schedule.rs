@@ -1,4 +1,4 @@
-//! The rules of the fuzzy controller.
+//! Gain scheduling: a linear law for each of several radii, blended.
 
 use hough_heuristic::Features;
 use nalgebra::{Matrix3, Vector3};
@@ -9,7 +9,7 @@ use crate::controllers::servo::settings::ServoSettings;
 
 /// One linear rule for each fuzzy set of the radius.
 #[derive(Clone, Debug)]
-pub(crate) struct Rules(Vec<Rule>);
+pub(crate) struct Schedule(Vec<Rule>);
 
 /// If the radius is about `radius`, then the turns are `turns` times the errors.
 #[derive(Clone, Debug)]
@@ -31,7 +31,7 @@ const SETS: [(f64, f64, f64); 4] = [
 /// Weight of the row of 33 / r beside those of x and y, units.
 const NEARNESS: f64 = 60.0;
 
-impl Rules {
+impl Schedule {
     /// Derives the rules from the camera model of `settings`.
     pub(crate) fn new(settings: &ServoSettings) -> Self {
         let rules = SETS.iter().filter_map(|&(radius, jt2, jt3)| {
@@ -59,9 +59,9 @@ impl Rules {
         Self(rules.collect())
     }
 
-    /// Returns the turns of `JT1` to `JT3` for a ball with the features `seen`; `None` without
-    /// rules.
-    pub(crate) fn turns(&self, settings: &ServoSettings, seen: &Features) -> Option<[f64; 3]> {
+    /// Returns the turns of `JT1` to `JT3` for a ball with the features `seen`, at gain 1; `None`
+    /// without rules.
+    pub(crate) fn turns(&self, settings: &ServoSettings, seen: &Features) -> Option<Vector3<f64>> {
         let goal = &settings.goal;
         let (x, y) = (goal.x - seen.x, goal.y - seen.y);
         let gate = aligned(x, 25.0, 80.0).min(aligned(y, 25.0, 70.0));
@@ -75,7 +75,7 @@ impl Rules {
             .zip(self.degrees(seen.r))
             .map(|(rule, degree)| rule.turns * error * degree)
             .sum();
-        (!self.0.is_empty()).then(|| (wanted * settings.gain).into())
+        (!self.0.is_empty()).then_some(wanted)
     }
 
     /// Returns the degree to which each rule's condition holds at radius `r`; the sum is 1.
@@ -99,6 +99,6 @@ impl Rules {
 
 /// Returns the degree to which an error of `error` units counts as *aligned*: 1 within `full`, 0
 /// beyond `none`.
-fn aligned(error: f64, full: f64, none: f64) -> f64 {
+pub(crate) fn aligned(error: f64, full: f64, none: f64) -> f64 {
     ((none - error.abs()) / (none - full)).clamp(0.0, 1.0)
 }

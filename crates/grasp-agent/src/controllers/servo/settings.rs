@@ -1,6 +1,7 @@
 //! Settings of the servo controllers.
 
 use hough_heuristic::Features;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::behaviour::spec::GoalInterval;
@@ -20,6 +21,11 @@ pub struct ServoSettings {
     pub goal: Features,
     /// Fraction of the error that one move removes, above 0 and finite (default 1).
     pub gain: f64,
+    /// Gain far from the goal, and slope of the gain at the goal per error of a goal radius: the
+    /// adaptive gain of `ViSP` (default `None`, a constant gain). With [`ServoSettings::gain`] as
+    /// that at the goal, the gain at the error e is (gain - far) exp(-slope e / (gain - far)) +
+    /// far.
+    pub adaptive: Option<[f64; 2]>,
     /// Largest turns of `JT1` to `JT3` in one move, radians (default
     /// [`JointLimits::PAPER_STEPS`]).
     pub steps: [f64; 3],
@@ -35,6 +41,7 @@ impl ServoSettings {
             model: CameraModel::paper(),
             goal: GoalInterval::paper_features(),
             gain: 1.0,
+            adaptive: None,
             steps: JointLimits::PAPER_STEPS,
         }
     }
@@ -45,6 +52,32 @@ impl ServoSettings {
         Self { gain, ..self }
     }
 
+    /// Returns the gain at an error in goal radii.
+    pub(crate) fn gain_at(&self, error: f64) -> f64 {
+        match self.adaptive {
+            Some([far, slope]) if (self.gain - far).abs() > 1e-9 => {
+                let span = self.gain - far;
+                span * (-slope * error / span).exp() + far
+            }
+            _ => self.gain,
+        }
+    }
+
+    /// Returns the features (x/r, y/r, 1/r) of a sphere, scaled to feature units at the goal.
+    pub(crate) fn sphere(&self, seen: &Features) -> Vector3<f64> {
+        let [cx, cy] = self.model.centre;
+        let scale = self.goal.r / seen.r;
+        Vector3::new(seen.x - cx, seen.y - cy, self.goal.r) * scale
+    }
+
+    /// Converts an image Jacobian at the goal to one of [`ServoSettings::sphere`].
+    pub(crate) fn by_sphere(&self, jacobian: &Matrix3<f64>) -> Matrix3<f64> {
+        let here = self.sphere(&self.goal) / self.goal.r;
+        let mut by_features = Matrix3::identity();
+        by_features.set_column(2, &Vector3::new(-here.x, -here.y, -1.0));
+        by_features * jacobian
+    }
+
     /// Checks the settings, for example after they were read from a file.
     ///
     /// # Errors
@@ -53,6 +86,14 @@ impl ServoSettings {
         self.model.check()?;
         check_goal(&self.goal)?;
         above_zero("gain", self.gain)?;
+        if let Some([far, slope]) = self.adaptive {
+            above_zero("the gain far from the goal", far)?;
+            above_zero("the slope of the gain", slope)?;
+            if far > self.gain {
+                let fault = format!("the gain far from the goal, {far}, exceeds that at the goal");
+                return Err(BehaviourError::Settings(fault));
+            }
+        }
         Ok(check_steps(&self.steps)?)
     }
 }
