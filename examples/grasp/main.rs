@@ -103,8 +103,8 @@ fn run(options: &Options) -> Outcome {
     let mind = match taught {
         None => Mind::Hybrid(Box::new(hybrid(options, goal.as_ref())?)),
         Some(Taught { learned, limits }) => {
-            export(options, &learned, &limits)?;
             config.limits = limits;
+            export(options, &learned, &config)?;
             let shown = goal.iter().fold(learned, Learned::shown);
             Mind::Learned(Box::new(shown))
         }
@@ -200,12 +200,13 @@ fn run(options: &Options) -> Outcome {
         }
     }
     bar.finish_and_clear();
-    let (limits, shown) = (agent.config().limits, agent.config().goal.clone());
+    let config = agent.config().clone();
+    let shown = config.goal.clone();
     match agent.into_controller().inner {
         // Includes what was learned in a run that was broken off.
         Mind::Learned(learned) if options.keep_learning => {
             save(options, &learned)?;
-            export(options, &learned, &limits)?;
+            export(options, &learned, &config)?;
         }
         Mind::Learned(_) => {}
         Mind::Hybrid(hybrid) => hybrid.belief().save(&out("camera.belief"))?,

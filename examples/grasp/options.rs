@@ -98,6 +98,16 @@ impl Options {
         self.reward.unwrap_or(RewardName::Mended)
     }
 
+    /// Returns the program, its version and its command line, as the origin of an exported policy.
+    pub(crate) fn made_by(&self) -> String {
+        let arguments: Vec<String> = std::env::args().skip(1).collect();
+        let (version, seed) = (env!("CARGO_PKG_VERSION"), self.seed);
+        format!(
+            "puma-grasp {version}, grasp {}, seed {seed}",
+            arguments.join(" ")
+        )
+    }
+
     /// Returns the form of the regression simulator, by default that of 22 terms.
     pub(crate) fn form(&self) -> MoveForm {
         match self.simulator {

@@ -28,8 +28,8 @@ pub(crate) fn learning_curves(path: &Path, lessons: &[Lesson]) -> Outcome {
     write_svg(path, &panels.collect::<Vec<_>>(), 2, (500, 360))
 }
 
-/// Draws x, y and r at every step of every run, with the goal interval shaded; three runs, from
-/// far, middle and near, stand out.
+/// Draws x, y and r at every step of every run, with the goal interval shaded and losses of the
+/// ball marked; three runs, from far, middle and near, stand out.
 pub(crate) fn features_per_step(path: &Path, runs: &[RunRecord], goal: &[GoalInterval]) -> Outcome {
     let tracks = runs.iter().map(|run| &run.track);
     let mut tracks: Vec<&Vec<(usize, Features)>> = tracks.filter(|t| !t.is_empty()).collect();
@@ -57,7 +57,9 @@ pub(crate) fn features_per_step(path: &Path, runs: &[RunRecord], goal: &[GoalInt
         let named = distinct
             .iter()
             .filter_map(|(index, words)| Some(((*words).into(), line(tracks.get(*index)?))));
+        let lost = runs.iter().flat_map(|run| &run.lost);
         Panel {
+            lost: lost.map(|(step, f)| (*step as f64, of(f))).collect(),
             title: format!("{name} until the grip"),
             across: across.clone(),
             up: format!("{name}, feature units"),

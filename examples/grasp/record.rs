@@ -20,6 +20,8 @@ pub(crate) struct RunRecord {
     pub(crate) saved: SavedRun,
     /// Features at every step from the first sighting on, as in Fig. 7 of the paper.
     pub(crate) track: Vec<(usize, Features)>,
+    /// The steps of the track after which the ball was lost.
+    pub(crate) lost: Vec<(usize, Features)>,
     /// Number of frames.
     frames: usize,
     /// Set while the jaws are closed, when sightings do not count.
@@ -77,6 +79,7 @@ impl RunRecord {
             summary,
             saved,
             track: Vec::new(),
+            lost: Vec::new(),
             frames: 0,
             gripped: false,
         }
@@ -93,6 +96,7 @@ impl RunRecord {
             }
             EventKind::Gripped => self.gripped = true,
             EventKind::Missed => self.gripped = false,
+            EventKind::Lost => self.lost.extend(self.track.last()),
             EventKind::Seen(sighting) if !self.gripped => features = Some(sighting.features),
             EventKind::Moved(delta) => {
                 let [d1, d2, d3, ..] = delta.degrees();

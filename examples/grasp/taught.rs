@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use grasp_agent::{
-    AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, Belief, CameraEye, Controller, Decision,
-    Eye, Feedback, GaveUp, Hybrid, HybridSettings, JointLimits, Learned, Lesson, Percept, Request,
-    SavedController, ServoSettings, Sighting, TaughtGoal,
+    AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, Belief, CameraEye, CameraModel,
+    Controller, Decision, Eye, Feedback, GaveUp, Hybrid, HybridSettings, JointLimits, Learned,
+    Lesson, Percept, Request, SavedController, ServoSettings, Sighting, TaughtGoal,
 };
 use hough_heuristic::{CircleDetector, Features};
 use pipeline_sim::{MoveSample, Workspace};
@@ -316,7 +316,7 @@ impl Taught {
             let name = path.display();
             let text = fs::read_to_string(path)
                 .map_err(|error| format!("{name}: cannot be read: {error}"))?;
-            let (learned, limits) =
+            let (learned, config) =
                 Learned::from_json(&text).map_err(|error| format!("{name}: {error}"))?;
             let found = [learned.centering(), learned.approaching()].map(Behaviour::spec);
             let asked = [&pair.centering, &pair.approaching];
@@ -324,7 +324,7 @@ impl Taught {
                 let advice = "learned for another goal; give the --y-goal it was learned with";
                 return Err(format!("{name}: {advice}").into());
             }
-            (learned, limits)
+            (learned, config.limits)
         } else {
             let [centering, approaching] = [&pair.centering, &pair.approaching]
                 .map(|spec| Behaviour::load(&policy_path(path, spec), spec));
@@ -343,11 +343,13 @@ pub(crate) fn save(options: &Options, learned: &Learned) -> Outcome {
 }
 
 /// Writes the policy as JSON if asked for.
-pub(crate) fn export(options: &Options, learned: &Learned, limits: &JointLimits) -> Outcome {
+pub(crate) fn export(options: &Options, learned: &Learned, config: &AgentConfig) -> Outcome {
     let Some(path) = &options.export else {
         return Ok(());
     };
-    write_whole(path, learned.to_json(limits).as_bytes())?;
+    let made_by = options.made_by();
+    let text = learned.to_json(config, &CameraModel::paper(), &made_by);
+    write_whole(path, text.as_bytes())?;
     options.say(format_args!("policy exported to {}", path.display()));
     Ok(())
 }

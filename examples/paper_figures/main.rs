@@ -212,22 +212,30 @@ fn scored(lesson: &Result<Lesson, BehaviourError>, starts: &[PlaneStart]) -> Str
     }
 }
 
-/// Features and theta 3 at every step of a run.
-type Path = Vec<(Features, f64)>;
+/// Features and theta 3 at every step of a run, and `true` if the ball was lost by the move that
+/// followed.
+type Path = Vec<(Features, f64, bool)>;
+
+/// Returns where the ball was lost on a path, for a reader of a feature.
+fn lost(path: &Path, of: fn(&Features) -> f64) -> impl Iterator<Item = (f64, f64)> + '_ {
+    let marked = path.iter().enumerate().filter(|(_, (.., lost))| *lost);
+    marked.map(move |(i, (f, ..))| (i as f64, of(f)))
+}
 
 /// Draws features per step while reaching, by distance and elbow, and while the ball is pushed away
 /// repeatedly.
 fn figures_7_and_8(options: &Options, taught: &Learned) -> Outcome {
     let cell = TrialCell::draw(ErrorLevel::None, 0)?;
     let path = options.out.join("figures7and8.csv");
-    let mut csv = Table::create(path, "figure,run,step,x,y,r,theta3")?;
+    let mut csv = Table::create(path, "figure,run,step,x,y,r,theta3,lost")?;
     let mut paths = |figure: u32, runs: u64, pushes: usize| -> Outcome<Vec<Path>> {
         let mut paths = Vec::new();
         for run in 0..runs {
             let path = path_of(&cell, taught, 500 + run, pushes)?;
-            for (step, (Features { x, y, r }, theta3)) in path.iter().enumerate() {
+            for (step, (Features { x, y, r }, theta3, lost)) in path.iter().enumerate() {
+                let lost = u8::from(*lost);
                 csv.row(format_args!(
-                    "{figure},{run},{step},{x:.2},{y:.2},{r:.2},{theta3:.2}"
+                    "{figure},{run},{step},{x:.2},{y:.2},{r:.2},{theta3:.2},{lost}"
                 ))?;
             }
             paths.push(path);
@@ -240,7 +248,7 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Outcome {
     let mut panels = Vec::new();
     for (low, high) in [(-50.0, 6.0), (6.0, 27.0), (27.0, 60.0)] {
         let ends_here = |path: &&Path| {
-            let end = path.last().map(|(_, theta3)| *theta3);
+            let end = path.last().map(|(_, theta3, _)| *theta3);
             path.len() > 3 && end.is_some_and(|end| (low..high).contains(&end))
         };
         let mut paths: Vec<&Path> = reach.iter().filter(ends_here).collect();
@@ -256,10 +264,12 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Outcome {
         for (name, goal, _, of) in FEATURES {
             let lines = three.iter().filter_map(|(start, path)| {
                 let along = path.as_ref()?.iter().enumerate();
-                let line = along.map(|(i, (f, _))| (i as f64, of(f)));
+                let line = along.map(|(i, (f, ..))| (i as f64, of(f)));
                 Some((format!("{start} start"), line.collect()))
             });
+            let drawn = three.iter().filter_map(|(_, path)| *path);
             panels.push(Panel {
+                lost: drawn.flat_map(|path| lost(path, of)).collect(),
                 title: format!("{name}, theta 3 ends in {low}..{high}"),
                 across: "moves".into(),
                 up: "feature units".into(),
@@ -271,12 +281,13 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Outcome {
     }
     write_svg(&options.out.join("figure7.svg"), &panels, 3, SIZE)?;
     let panels = track.iter().zip(1..).map(|(path, number)| {
-        let line = path.iter().enumerate().map(|(i, (f, _))| (i as f64, f.r));
+        let line = path.iter().enumerate().map(|(i, (f, ..))| (i as f64, f.r));
         Panel {
             title: format!("r, ball {number}, pushed to r = 60 three times"),
             across: "moves".into(),
             up: "feature units".into(),
             lines: vec![(String::new(), line.collect())],
+            lost: lost(path, |f| f.r).collect(),
             goal: Some(FEATURES[2].1),
             top: Some(70.0),
             ..Panel::default()
@@ -307,7 +318,12 @@ fn path_of(cell: &TrialCell, taught: &Learned, seed: u64, pushes: usize) -> Outc
                 path.pop();
             }
             let f = sighting.features;
-            path.push((f, Percept::new(f, &event.joints).theta3));
+            path.push((f, Percept::new(f, &event.joints).theta3, false));
+        }
+        if event.kind == EventKind::Lost
+            && let Some((.., lost)) = path.last_mut()
+        {
+            *lost = true;
         }
     })?;
     Ok(path)

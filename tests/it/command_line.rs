@@ -10,9 +10,10 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 use grasp_agent::{
-    Behaviour, BehaviourPair, BehaviourSpec, EventKind, GoalInterval, JointLimits, Learned,
-    SavedRun,
+    AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraModel, EventKind, GoalInterval,
+    Learned, SavedRun,
 };
+use pipeline_sim::Workspace;
 use qtable::QTable;
 
 /// Ends the test, as skipped, where an example has not been built.
@@ -134,7 +135,9 @@ fn blank_policy(pair: BehaviourPair) -> String {
         let table = QTable::new(spec.states(), spec.actions()).expect("a table");
         Behaviour::new(spec, table).expect("a table of its size")
     };
-    Learned::new(blank(pair.centering), blank(pair.approaching)).to_json(&JointLimits::paper())
+    let config = AgentConfig::paper(Workspace::paper().search_poses());
+    let learned = Learned::new(blank(pair.centering), blank(pair.approaching));
+    learned.to_json(&config, &CameraModel::paper(), "a test")
 }
 
 /// Writes a policy that has learned nothing. Returns its path.
@@ -359,7 +362,7 @@ fn kept_runs_of_every_controller_replay_the_same() {
         "position-based, gain 1",
         "goal J, gain 0.5",
         "current J, gain 1",
-        "fuzzy, gain 0.7",
+        "gain-scheduled, gain 0.7",
         "look-ahead",
         "hybrid, untaught",
     ];

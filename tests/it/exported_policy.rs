@@ -1,17 +1,17 @@
 //! An exported policy says all that another program needs: docs/run_policy.py, which knows nothing
-//! but the file and the arm's geometry, reaches the balls with it, and in as many moves as the
+//! but the file, reaches the balls with it, and in as many moves as the
 //! controller here.
 
 use std::process::Command;
 
 use example_support::trial::TrialCell;
-use grasp_agent::{Agent, AgentConfig, JointLimits};
+use grasp_agent::{Agent, AgentConfig, CameraModel};
 use pipeline_sim::{ErrorLevel, Workspace};
 
 use crate::learned;
 
 /// Balls reached, and moves on average, as the script says: "reached 198 of 200 balls, in 9.71
-/// moves on average".
+/// moves on average; gripped 197".
 fn by_the_script(policy: &str) -> Option<(usize, f64)> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("policy.json");
@@ -35,22 +35,23 @@ fn by_the_script(policy: &str) -> Option<(usize, f64)> {
         .split_whitespace()
         .filter_map(|word| word.parse().ok())
         .collect();
-    assert_eq!(numbers.len(), 3, "{said}");
-    let (reached, moves) = (numbers[0], numbers[2]);
+    assert_eq!(numbers.len(), 4, "{said}");
+    let (reached, moves, gripped) = (numbers[0], numbers[2], numbers[3]);
+    assert!(gripped > 0.98 * reached, "{said}");
     Some((reached as usize, moves))
 }
 
 #[test]
 fn another_program_reaches_the_balls_with_an_exported_policy() {
     let learned = learned().clone();
-    let policy = learned.to_json(&JointLimits::paper());
+    let mut config = AgentConfig::paper(Workspace::paper().search_poses());
+    let policy = learned.to_json(&config, &CameraModel::paper(), "a test");
     let Some((reached, moves)) = by_the_script(&policy) else {
         return;
     };
     let cell = TrialCell::draw(ErrorLevel::None, 0)
         .expect("a camera")
         .without_bodies();
-    let mut config = AgentConfig::paper(Workspace::paper().search_poses());
     // What the hand touches nothing with it cannot lift.
     config.lift = None;
     let mut agent = Agent::with_controller(config, learned).expect("valid settings");

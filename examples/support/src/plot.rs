@@ -27,6 +27,8 @@ pub struct Panel {
     pub behind: Vec<Vec<(f64, f64)>>,
     /// Place, lower and upper end of the band.
     pub band: Vec<(f64, f64, f64)>,
+    /// Points at which the ball was lost, marked by a cross.
+    pub lost: Vec<(f64, f64)>,
     /// Interval that is shaded.
     pub goal: Option<(f64, f64)>,
     /// Upper end of the vertical axis, by default a little above the highest point.
@@ -160,8 +162,15 @@ impl Panel {
                 chart.draw_series(line.iter().map(|at| Circle::new(*at, 2, colour.filled())))?;
             }
         }
+        if !self.lost.is_empty() {
+            let cross = |at: (f64, f64)| Cross::new(at, 5, BLACK.stroke_width(2));
+            chart
+                .draw_series(self.lost.iter().map(|at| cross(*at)))?
+                .label("lost after this move")
+                .legend(|(x, y)| Cross::new((x + 8, y), 5, BLACK.stroke_width(2)));
+        }
         let named = self.lines.iter().any(|(name, _)| !name.is_empty());
-        if named || self.goal.is_some() || !self.band.is_empty() {
+        if named || self.goal.is_some() || !self.band.is_empty() || !self.lost.is_empty() {
             chart
                 .configure_series_labels()
                 .position(self.free_corner(right, top))

@@ -1,5 +1,6 @@
 //! The paper's controller: two learned behaviours, frozen or learning at work.
 
+use hough_heuristic::Features;
 use puma_val2::{JointDelta, Joints};
 use qtable::rand::rngs::Xoshiro256PlusPlus;
 use qtable::rand::{RngExt, SeedableRng};
@@ -16,6 +17,10 @@ use crate::record::policy_json::PolicyJson;
 
 /// The paper's controller (section 3): two learned behaviours, centering and approaching. In every
 /// cycle each of them chooses a move for its own joints.
+///
+/// Near the left and right border of the frame ([`Learned::BORDER`]) centering moves first and
+/// approaching waits. A ball that is lost counts against the behaviour that lost it: approaching if
+/// it moved, else centering.
 ///
 /// Its tables stay as they are unless [`Learned::learning`] is called. It then goes on learning
 /// during the runs: one-step Q-learning by the rewards of the two [`BehaviourSpec`]s. Moves that
@@ -107,6 +112,10 @@ impl Learned {
     pub const CENTERING_KAPPA: f64 = KAPPA;
     /// Default repetition penalty of approaching, in units of Q.
     pub const APPROACHING_KAPPA: f64 = KAPPA;
+
+    /// Distance of the ball from the left or right border of the frame, feature units, within which
+    /// only centering moves.
+    pub const BORDER: f64 = 20.0;
 
     /// Creates a controller from two behaviours, frozen, with the repetition penalties
     /// [`Learned::CENTERING_KAPPA`] and [`Learned::APPROACHING_KAPPA`].
@@ -209,9 +218,15 @@ impl Controller for Learned {
         let turn = self
             .centering
             .decide(&percept, self.learning.as_mut(), admitted)?;
-        let reach = self
-            .approaching
-            .decide(&percept, self.learning.as_mut(), admitted)?;
+        let x = ball.features.x;
+        let inside = (Self::BORDER..=Features::WIDTH - Self::BORDER).contains(&x);
+        self.approaching.last = None;
+        let reach = if inside || turn == JointDelta::default() {
+            self.approaching
+                .decide(&percept, self.learning.as_mut(), admitted)?
+        } else {
+            JointDelta::default()
+        };
         let both = std::array::from_fn(|i| turn.0[i] + reach.0[i]);
         Ok(Decision::Move(JointDelta(both)))
     }
@@ -221,14 +236,20 @@ impl Controller for Learned {
             Feedback::Seen { ball, joints } => Some(self.percept(ball, joints)),
             _ => None,
         };
-        for half in [&mut self.centering, &mut self.approaching] {
+        let wrong = matches!(feedback, Feedback::Lost | Feedback::TakenBack);
+        let both = [&mut self.approaching, &mut self.centering];
+        if wrong {
+            // The behaviour that lost the ball: the first of them that moved.
+            if let Some(half) = both.into_iter().find(|half| half.has_moved()) {
+                half.learn(self.learning.as_mut(), None);
+                half.bar_last();
+            }
+            return;
+        }
+        for half in both {
             match feedback {
                 Feedback::Begin => half.begin(),
                 Feedback::Seen { .. } => half.learn(self.learning.as_mut(), now.as_ref()),
-                Feedback::Lost | Feedback::TakenBack => {
-                    half.learn(self.learning.as_mut(), None);
-                    half.bar_last();
-                }
                 _ => {}
             }
         }
@@ -301,6 +322,15 @@ impl Half {
         self.last = Some((*percept, state, action));
         self.episode.chose(state, action);
         Ok(spec.delta(action))
+    }
+
+    /// Returns `true` if the action chosen last moves a joint.
+    fn has_moved(&self) -> bool {
+        let spec = self.behaviour.spec();
+        let delta = |(_, _, action)| spec.delta(action);
+        self.last
+            .map(delta)
+            .is_some_and(|d| d != JointDelta::default())
     }
 
     /// Bars the action chosen last in its state for the rest of this run.
