@@ -40,7 +40,7 @@ pub(crate) fn overview(cell: &Cell, workspace: &Workspace, path: &[Joints]) -> O
         let at = |along: f64| Point3::new(along * pan.cos(), along * pan.sin(), cell.table);
         let (space, sight) = (SPACE.stroke_width(2), SIGHT.stroke_width(1));
         let from_side = [
-            ("workspace", section(cell, workspace, pan), space),
+            ("workspace", section(workspace, pan), space),
             ("table", vec![at(-0.6), at(1.2)], TABLE.stroke_width(3)),
             ("", vec![at(0.0), Point3::origin()], ARM.stroke_width(8)),
             ("field of view", vec![eye, upper, lower, eye], sight),
@@ -167,7 +167,7 @@ fn ring(workspace: &Workspace) -> Vec<Point3<f64>> {
 
 /// Returns the section of the workspace with the arm's plane, which passes the waist axis at the
 /// shoulder's offset, turned by `pan`.
-fn section(cell: &Cell, workspace: &Workspace, pan: f64) -> Vec<Point3<f64>> {
+fn section(workspace: &Workspace, pan: f64) -> Vec<Point3<f64>> {
     let (d2, (low, high)) = (PumaParams::unimation().d2, workspace.height);
     let along = |rho: f64| (rho * rho - d2 * d2).max(0.0).sqrt();
     let (near, far) = (along(workspace.rho.0), along(workspace.rho.1));

@@ -137,7 +137,13 @@ impl Fit<'_> {
                 spare[i / 2] += 1.0 - (&row * covariance * row.transpose())[0];
             }
         }
-        std::array::from_fn(|i| (squares[i] / spare[i].max(1.0)).sqrt().max(1e-6))
+        // Each by itself has few looks to spare: both are drawn toward their common value.
+        const COMMON: f64 = 15.0;
+        let common = (squares[0] + squares[1]) / (spare[0] + spare[1]).max(1.0);
+        std::array::from_fn(|i| {
+            let square = (squares[i] + COMMON * common) / (spare[i].max(0.0) + COMMON);
+            square.sqrt().max(1e-6)
+        })
     }
 
     /// Returns the looks that fit the others at `cell`, by the median of the residuals: all, if more

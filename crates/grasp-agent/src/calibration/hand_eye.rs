@@ -133,7 +133,7 @@ impl HandEye {
                     "the ball is not in view; move the arm until it is, and begin there",
                 ));
             } else {
-                care *= 1.3;
+                care = (1.3_f64 * care).min(6.0);
             }
             if looks.len() == self.looks {
                 return self.fit(&looks);
@@ -144,7 +144,7 @@ impl HandEye {
                 ));
             };
             // In tight places the ball may be seen less surely.
-            let next = [1.0, 0.5, 0.2].into_iter().find_map(|less| {
+            let next = [1.0, 0.5, 0.2, 0.0].into_iter().find_map(|less| {
                 let known = Known {
                     cell,
                     covariance,
@@ -184,6 +184,8 @@ impl HandEye {
             noise: [0.5; 2],
             nominal: None,
         };
+        let first = fit.good(&cell);
+        fit.looks = &first;
         cell = fit.solve(cell).ok_or_else(no_fit)?.0;
         let kept = fit.good(&cell);
         fit.looks = &kept;
@@ -240,20 +242,26 @@ impl HandEye {
         })
     }
 
-    /// Returns the cell by looks and expectation together, and its covariance.
+    /// Returns the cell by looks and expectation together, without looks that do not fit, and its
+    /// covariance.
     fn known(
         &self,
         looks: &[Look],
         start: Estimated,
         zeros: &[Joint],
     ) -> Option<(Estimated, DMatrix<f64>)> {
-        let fit = Fit {
+        let mut fit = Fit {
             looks,
             zeros,
             noise: [0.5; 2],
             nominal: Some(self.nominal_with_ball(looks).ok()?),
         };
-        let (cell, information) = fit.solve(start)?;
+        let (mut cell, mut information) = fit.solve(start)?;
+        let kept = fit.good(&cell);
+        if kept.len() < looks.len() {
+            fit.looks = &kept;
+            (cell, information) = fit.solve(cell)?;
+        }
         Some((cell, information.try_inverse()?))
     }
 

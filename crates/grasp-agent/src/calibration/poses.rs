@@ -9,7 +9,7 @@ use crate::calibration::cell::Estimated;
 use crate::calibration::hand_eye::HandEye;
 
 /// Number of poses to choose among.
-const CANDIDATES: usize = 200;
+const CANDIDATES: usize = 120;
 /// Largest turn of a wrist joint from where the calibration began, radians.
 const WRIST: f64 = 1.4;
 
@@ -60,6 +60,11 @@ impl Known<'_> {
         /// Largest turn of a joint between two checks, radians.
         const STEP: f64 = 0.05;
         let mut from = self.poses[self.poses.len() - 1];
+        // A hand that is too near already may go away.
+        let clearance = task.clearance.min(self.distance(&from) - 1e-6);
+        if self.distance(pose) < task.clearance {
+            return false;
+        }
         [task.before(pose), *pose].into_iter().all(|to| {
             let turns: [f64; 6] = std::array::from_fn(|i| to.0[i] - from.0[i]);
             let most = turns
@@ -69,21 +74,21 @@ impl Known<'_> {
             let clear = (1..=steps).all(|k| {
                 let share = f64::from(k) / f64::from(steps);
                 let on_the_way = from + JointDelta(turns.map(|turn| share * turn));
-                self.is_clear(task, &on_the_way) && free(&on_the_way)
+                self.distance(&on_the_way) >= clearance && free(&on_the_way)
             });
             from = to;
             clear
         })
     }
 
-    /// Returns `true` if the line from the hand to the tool point keeps the clearance of the ball.
-    fn is_clear(&self, task: &HandEye, pose: &Joints) -> bool {
+    /// Returns the distance of the ball's centre from the line between hand and tool point.
+    fn distance(&self, pose: &Joints) -> f64 {
         let (model, ball) = (&self.cell.model, &self.cell.ball);
         let hand = model.arm.wrist(pose) * Point3::new(0.0, 0.0, model.arm.flange());
         let along = model.tool_point(pose) - hand;
         let share = (ball - hand).dot(&along) / along.norm_squared().max(1e-12);
         let nearest = hand + along * share.clamp(0.0, 1.0);
-        (ball - nearest).norm() >= task.clearance
+        (ball - nearest).norm()
     }
 
     /// Draws a pose that shows the ball somewhere in the image, or one on the way there.
@@ -135,7 +140,7 @@ impl Known<'_> {
         };
         let shown = within(seen.x, off.x, Features::WIDTH)
             && within(seen.y, off.y, Features::HEIGHT)
-            && seen.z - off.z > 6.0
+            && seen.z - off.z > 4.0
             && radius < 50.0;
         let gain = (Matrix3::identity() + spread / (NOISE * NOISE)).determinant();
         (shown && gain.is_finite()).then(|| gain.ln())
