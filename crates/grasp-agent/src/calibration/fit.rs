@@ -146,8 +146,8 @@ impl Fit<'_> {
         })
     }
 
-    /// Returns the looks that fit the others at `cell`, by the median of the residuals: all, if more
-    /// than a quarter does not.
+    /// Returns the looks that fit the others at `cell`, by the median of the residuals: all, if
+    /// more than a quarter does not.
     pub(crate) fn good(&self, cell: &Estimated) -> Vec<Look> {
         /// Median of normal residuals, with what a fit takes of them, to their deviation.
         const MEDIAN: f64 = 0.5;

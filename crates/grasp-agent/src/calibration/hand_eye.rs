@@ -14,6 +14,7 @@ use crate::calibration::poses::Known;
 use crate::checked::above_zero;
 use crate::error::AgentError;
 use crate::limits::JointLimits;
+use crate::percept::Sighting;
 use crate::sight::camera_model::CameraModel;
 use crate::sight::eye::Eye;
 
@@ -120,7 +121,7 @@ impl HandEye {
             if let Some(joint) = joints.non_finite() {
                 return Err(AgentError::Pose { joint });
             }
-            if let Some(ball) = eye.look()?.filter(|ball| ball.is_finite()) {
+            if let Some(ball) = eye.look()?.filter(Sighting::is_finite) {
                 looks.push((joints, ball.features));
                 poses.push(joints);
                 let start = match known.take() {

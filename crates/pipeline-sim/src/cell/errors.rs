@@ -255,9 +255,7 @@ impl Errors {
         if !self.distortion.is_none() {
             cell.camera = cell.camera.with_distortion(self.distortion)?;
         }
-        if self.link_shift != [0.0; 2] {
-            cell.arm = cell.arm.lengthened(self.link_shift);
-        }
+        cell.arm = cell.arm.lengthened(self.link_shift);
         // Shifted along the camera's own axes, then turned in place.
         let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), self.yaw)
             * Rotation3::from_axis_angle(&Vector3::x_axis(), self.pitch)

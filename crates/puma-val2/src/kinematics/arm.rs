@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chain_is_lengthened_and_droops_like_the_puma_it_was_read_off() {
+    fn a_chain_lengthens_and_droops_like_the_puma_it_was_read_off() {
         let puma = Arm::from(PumaParams::unimation());
         let read = Arm::of(&puma).unwrap();
         for k in 0..20 {
