@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """Opens the page of a run in a headless browser: frames advance, Stop ends the run.
 
-Usage: browser.py GRASP FOLDER. Pictures go to FOLDER. Needs chromium and chromedriver.
+Usage: browser.py GRASP FOLDER [PAGE]. Pictures go to FOLDER. Needs chromium and chromedriver.
+PAGE is the page that needs no program.
 """
 import atexit, base64, json, os, re, subprocess, sys, time, urllib.error, urllib.request
 
 grasp, folder = sys.argv[1:3]
+page = sys.argv[3] if len(sys.argv) > 3 else None
 
 
 def child(*words, **more):
@@ -131,6 +133,19 @@ assert post(base + "stop?token=" + token[:-1] + "x", {"x-stop": "1"}) == 403
 assert post(f"{base}stop?token={token}", {"x-stop": "1"}) == 200
 program.communicate(timeout=120)
 assert program.returncode == 130
+
+# The page that learns and reaches by itself, from the disk.
+if page:
+    desktop.open("file://" + os.path.abspath(page))
+    ended = "return document.body.dataset.ended"
+    for button in "teach", "go":
+        wait(button, lambda: desktop.run(f"return !document.getElementById('{button}').disabled"))
+        desktop.ask("POST", f"/element/{desktop.element('#' + button)}/click", {})
+        time.sleep(0.5)
+    wait("a ball in view", lambda: desktop.run("return live.track.length > 3"), 120)
+    desktop.picture("tab.png")
+    said = wait("the end of the reach", lambda: desktop.run(ended), 120)
+    assert said == "grasped", said
 
 for browser in (desktop, phone):
     browser.close()

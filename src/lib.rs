@@ -47,6 +47,8 @@ mod camera;
 mod detector;
 mod rig;
 mod sampling;
+#[cfg(target_family = "wasm")]
+mod shared_line;
 mod simulator;
 
 pub use grasp_agent;

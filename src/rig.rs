@@ -8,14 +8,18 @@ use std::time::Duration;
 use grasp_agent::{Agent, AgentError, CameraEye, Controller, RunEvent, RunOutcome};
 use hough_heuristic::{CircleDetector, FrameSource};
 use pipeline_sim::{Ball, Cell, CellCamera, Contacts, Renderer, Scene, SharedCell};
+#[cfg(not(target_family = "wasm"))]
+use puma_val2::EmulatorServer;
 #[cfg(feature = "serial")]
 use puma_val2::SerialLine;
 use puma_val2::{
-    ArmError, ClientConfig, Emulator, EmulatorServer, Gripper, GuardedArm, Joints, Manipulator,
-    Profile, ProximitySensor, PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
+    ArmError, ClientConfig, Emulator, Gripper, GuardedArm, Joints, Manipulator, Profile,
+    ProximitySensor, PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
 };
 
 use crate::detector::BallDetector;
+#[cfg(target_family = "wasm")]
+use crate::shared_line::SharedLine;
 
 /// An arm behind a VAL II controller, calibrated, in a simulated cell: a ball to place, a camera on
 /// the hand whose frames are rendered from the arm's pose, proximity sensors, and a gripper that
@@ -43,6 +47,7 @@ pub struct Rig {
 type Pose = Arc<dyn Fn() -> Joints + Send + Sync>;
 
 /// Baud rate of VAL II's terminal line (8 data bits, no parity, one stop bit).
+#[cfg(feature = "serial")]
 const BAUD: u32 = 9600;
 
 /// Monitor speed of an emulated arm, percent.
@@ -53,8 +58,8 @@ const SOCKET_TIMEOUT: Duration = Duration::from_secs(5);
 
 impl Rig {
     /// Starts a controller emulator and connects to it: through a pseudo-terminal opened like a
-    /// serial line where the system has them (Unix, feature `serial`), elsewhere through a local
-    /// socket.
+    /// serial line where the system has them (Unix, feature `serial`), in memory in WebAssembly,
+    /// through a local socket elsewhere.
     ///
     /// The emulated arm moves in no time unless `realtime` is set. `scene` and `seed` are the
     /// renderer's.
@@ -79,13 +84,20 @@ impl Rig {
             realtime,
             ..ServeConfig::default()
         };
+        #[cfg(target_family = "wasm")]
+        let (server, line) = {
+            // There are no threads and no devices: the controller runs when it is waited for.
+            let _ = config;
+            let line = SharedLine::new(emulator);
+            (line.clone(), line)
+        };
         #[cfg(all(unix, feature = "serial"))]
         let (server, line) = {
             let server = EmulatorServer::pty(emulator, config).map_err(RigError::Serve)?;
             let line = SerialLine::open(server.address(), BAUD)?;
             (server, line)
         };
-        #[cfg(not(all(unix, feature = "serial")))]
+        #[cfg(not(any(target_family = "wasm", all(unix, feature = "serial"))))]
         let (server, line) = {
             let server =
                 EmulatorServer::tcp("127.0.0.1:0", emulator, config).map_err(RigError::Serve)?;
