@@ -6,6 +6,8 @@
 //! They need no glue between Rust and JavaScript.
 
 use std::cell::RefCell;
+use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use puma_grasp::grasp_agent::{Agent, AgentConfig, BehaviourPair, Learned, Percept, RunEvent};
 use puma_grasp::pipeline_sim::{Ball, Cell, MoveForm, Scene, Workspace};
@@ -65,6 +67,7 @@ pub extern "C" fn learn(seed: u32) -> u32 {
                     "actions": record.actions,
                     "success": record.success_share,
                 }));
+                ControlFlow::Continue(())
             })
         };
         let starts: Vec<_> = (0..TRIALS).map(|_| simulator.start(&mut rng)).collect();
@@ -95,7 +98,7 @@ pub extern "C" fn reach(seed: u32) -> u32 {
     answer(|tab| {
         let learned = tab.learned.clone().ok_or("nothing is learned yet")?;
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.into());
-        let mut rig = Rig::emulated(false, &Scene::bright_ball(), seed.into())?;
+        let mut rig = Rig::emulated(false, &Scene::bright_ball(), seed.into(), &Arc::default())?;
         let mut detector = BallDetector::AContrario.build(seed.into())?;
         let workspace = Workspace::paper();
         let (ball, _) = workspace
