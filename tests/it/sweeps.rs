@@ -90,7 +90,7 @@ fn shards_of_other_settings_are_refused_by_name() {
     assert!(errors.contains("settings.json"), "{errors}");
     fs::write(at("1").join("settings.json"), "{").expect("writable");
     let errors = merged(&at("out"), &[&at("1")]).expect("built");
-    assert!(errors.contains("settings.json: EOF"), "{errors}");
+    assert!(errors.contains("settings.json: damaged: EOF"), "{errors}");
     for wrong in ["0/2", "3/2", "2", "a/b", "1/0"] {
         let errors = sweep(&at("3"), &["--shard", wrong]).expect("built");
         assert!(errors.contains("I/N"), "{wrong}: {errors}");

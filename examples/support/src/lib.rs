@@ -1,6 +1,7 @@
 //! Shared parts of the example programs: start and end, trials, learning, result files, pictures,
 //! diagrams and tables.
 
+pub mod compare_controllers;
 pub mod comparison;
 pub mod files;
 pub mod learning;

@@ -1,11 +1,4 @@
-//! Compares all controllers on the same balls in the same cells with errors: the paper's learned
-//! behaviours, its alternatives, and the hybrid.
-//!
-//! ```text
-//! cargo run --release --example compare_controllers -- --help
-//! ```
-
-#![allow(clippy::print_stderr, reason = "a program for a terminal")]
+//! The program `compare_controllers`, for the example of this name and the Python package.
 
 mod rivals;
 mod sweep;
@@ -22,16 +15,16 @@ use puma_grasp::{BallDetector, Rig};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use example_support::comparison::Row;
-use example_support::files::writable_folder;
-use example_support::prelude::*;
-use example_support::program::on_threads;
-use example_support::stages::Stages;
-use example_support::tally::Counted;
-use example_support::trial::{Trial, TrialCell, ball_in_view, rig_with_errors, run_on_rig};
+use crate::comparison::Row;
+use crate::files::writable_folder;
+use crate::prelude::*;
+use crate::program::on_threads;
+use crate::stages::Stages;
+use crate::tally::Counted;
+use crate::trial::{Trial, TrialCell, ball_in_view, rig_with_errors, run_on_rig};
 
-use crate::rivals::{Rival, new_hybrid, rivals};
-use crate::sweep::{CellRuns, Settings, Shard, Sweep, Tables};
+use crate::compare_controllers::rivals::{Rival, new_hybrid, rivals};
+use crate::compare_controllers::sweep::{CellRuns, Settings, Shard, Sweep, Tables};
 
 /// Compares controllers on randomly drawn errors of arm and camera and randomly drawn balls, the
 /// same for all.
@@ -48,7 +41,7 @@ use crate::sweep::{CellRuns, Settings, Shard, Sweep, Tables};
 /// Every finished cell is kept in cells/ in the folder. Several processes share a sweep by --shard
 /// and a folder each; --resume goes on after a process was killed; --merge makes one result of all.
 #[derive(Parser, Debug)]
-struct Options {
+pub struct Options {
     /// Folder for comparison.csv and comparison.svg, runs.csv, times.csv and the finished cells
     #[arg(long, value_name = "DIR", default_value = "out/compare")]
     out: PathBuf,
@@ -108,11 +101,11 @@ struct Options {
 /// Ball of each controller, from 0, before which a camera slips.
 const SLIP_AT: u64 = 4;
 
-fn main() -> ExitCode {
-    start(run)
-}
-
-fn run(options: &Options) -> Outcome {
+/// Runs the program.
+///
+/// # Errors
+/// Wrong options, results of another sweep, and files that cannot be read or written.
+pub fn run(options: &Options) -> Outcome {
     // Refuses unknown names before anything is learned.
     with_odd(Errors::none(), options)?;
     let _lock = lock_folder(&options.out)?;
@@ -358,6 +351,7 @@ impl<'a> DrawnCell<'a> {
         Ok(agent.into_controller().frozen())
     }
 
+    #[allow(clippy::print_stderr, reason = "a program for a terminal")]
     fn report(&self, name: &str, run: &str, error: &dyn Error) {
         eprintln!("{}: broken off: {error}", self.run_name(name, run));
     }

@@ -8,13 +8,13 @@ use pipeline_sim::MoveForm;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use example_support::learning::{
+use crate::learning::{
     ACTIONS, ACTIONS_FINE, TRIALS, anywhere, learned_whole, paper_cell, simulators, until_stopped,
 };
-use example_support::plane::{ExactPlane, search_percepts};
-use example_support::prelude::*;
+use crate::plane::{ExactPlane, search_percepts};
+use crate::prelude::*;
 
-use crate::{Options, seed_of};
+use crate::compare_controllers::{Options, seed_of};
 
 /// A controller in the comparison.
 pub(crate) enum Rival {

@@ -1,5 +1,6 @@
 //! A sweep over cells: the part of it that a process does, and its results in files.
 
+use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -9,10 +10,10 @@ use pipeline_sim::ErrorLevel;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use example_support::comparison::{self, Row};
-use example_support::files::writable_folder;
-use example_support::prelude::*;
-use example_support::tally::{Counted, Tally};
+use crate::comparison::{self, Row};
+use crate::files::writable_folder;
+use crate::prelude::*;
+use crate::tally::{Counted, Tally};
 
 /// One part of a sweep, of several equal ones.
 #[derive(Clone, Copy, Debug)]
@@ -157,14 +158,21 @@ impl Sweep {
     /// Opens the results in a folder.
     ///
     /// # Errors
-    /// A folder without the settings of a sweep.
+    /// A folder without the settings of a sweep, or with those of another version.
     pub(crate) fn open(folder: &Path) -> Outcome<Self> {
         let file = folder.join("settings.json");
-        let text = fs::read_to_string(&file).map_err(|error| failed(&file, &error))?;
-        let settings = serde_json::from_str(&text).map_err(|error| failed(&file, &error))?;
+        let text = fs::read_to_string(&file)
+            .map_err(|error| failed(&file, &format!("no results of a sweep: {error}")))?;
+        let damaged = |error| failed(&file, &format!("damaged: {error}"));
+        let settings: Value = serde_json::from_str(&text).map_err(damaged)?;
+        let (made_by, this) = (&settings["version"], env!("CARGO_PKG_VERSION"));
+        if made_by.as_str().is_some_and(|made_by| made_by != this) {
+            let reason = format!("made by version {made_by}, this is {this}: use one version");
+            return Err(failed(&file, &reason));
+        }
         Ok(Self {
             folder: folder.to_owned(),
-            settings,
+            settings: serde_json::from_value(settings).map_err(damaged)?,
         })
     }
 
@@ -196,9 +204,13 @@ impl Sweep {
             return Ok(None);
         }
         let text = fs::read_to_string(&file).map_err(|error| failed(&file, &error))?;
-        let cell: CellRuns = serde_json::from_str(&text).map_err(|error| failed(&file, &error))?;
+        let damaged = |reason: &dyn Display| {
+            let remedy = "delete it, and run its shard again with --resume";
+            failed(&file, &format!("damaged: {reason}; {remedy}"))
+        };
+        let cell: CellRuns = serde_json::from_str(&text).map_err(|error| damaged(&error))?;
         if cell.runs.len() != self.settings.controllers.len() {
-            return Err(failed(&file, &"it holds runs of other controllers"));
+            return Err(damaged(&"it holds runs of other controllers"));
         }
         Ok(Some(cell))
     }
@@ -276,7 +288,7 @@ impl Sweep {
     }
 }
 
-fn failed(file: &Path, reason: &dyn std::fmt::Display) -> Box<dyn std::error::Error> {
+fn failed(file: &Path, reason: &dyn Display) -> Box<dyn std::error::Error> {
     format!("{}: {reason}", file.display()).into()
 }
 
