@@ -155,13 +155,11 @@ impl Cell {
     /// Returns the outline of the ball in the image, inside the frame or not; `None` where it has
     /// none (behind the camera, camera inside the ball, joints or ball not finite).
     pub fn outline(&self, joints: &Joints) -> Option<ProjectedEllipse> {
-        self.project_ball(joints).ok()
+        self.project_ball(&self.camera_pose(joints)).ok()
     }
 
-    fn project_ball(&self, joints: &Joints) -> Result<ProjectedEllipse, SightError> {
-        let centre = self
-            .camera_pose(joints)
-            .inverse_transform_point(&self.ball.centre);
+    fn project_ball(&self, camera: &Isometry3<f64>) -> Result<ProjectedEllipse, SightError> {
+        let centre = camera.inverse_transform_point(&self.ball.centre);
         self.camera.project_sphere(&centre, self.ball.radius)
     }
 
@@ -176,7 +174,12 @@ impl Cell {
             finite(format!("the angle of {joint} (rad)"), joints[joint])?;
         }
         self.check_measures()?;
-        let outline = self.project_ball(joints)?;
+        self.circle_from(&self.camera_pose(joints))
+    }
+
+    /// Returns the circle that a camera at this pose shows.
+    pub(crate) fn circle_from(&self, camera: &Isometry3<f64>) -> Result<Circle, SightError> {
+        let outline = self.project_ball(camera)?;
         self.sight.check(&outline, self.camera.size())?;
         Ok(outline.circle())
     }
@@ -297,9 +300,18 @@ impl Cell {
     /// Returns the place at which the image shows a ball with these features; `None` if there is
     /// none.
     pub fn ball_showing(&self, joints: &Joints, features: &Features) -> Option<Point3<f64>> {
+        self.ball_before(&self.camera_pose(joints), features)
+    }
+
+    /// Returns the place at which a camera at this pose shows a ball with these features.
+    pub(crate) fn ball_before(
+        &self,
+        camera: &Isometry3<f64>,
+        features: &Features,
+    ) -> Option<Point3<f64>> {
         let circle = features.to_circle(self.camera.size().0);
         let centre = self.camera.sphere_of_circle(&circle, self.ball.radius)?;
-        Some(self.camera_pose(joints) * centre)
+        Some(camera * centre)
     }
 
     /// Returns the elbow-up pose, with `JT5` at `jt5_degrees` and `JT4` = `JT6` = 0, in which the
@@ -324,10 +336,10 @@ impl Cell {
         // The ball's place in the hand is fixed, so forearm, hand and ball are one rigid link: a
         // two-link arm in the plane.
         let hand = Joints::from_degrees([0.0, 0.0, 0.0, 0.0, jt5_degrees, 0.0]);
-        let goal = self
-            .ball_showing(&hand, &Self::GOAL)
-            .ok_or(SightError::NoView)?;
         let wrist = params.wrist(&hand);
+        let goal = self
+            .ball_before(&(wrist * self.mount), &Self::GOAL)
+            .ok_or(SightError::NoView)?;
         let mut in_hand = wrist.inverse_transform_point(&goal);
         in_hand.y = 0.0;
         let elbow = Point3::new(params.a2, params.d2, 0.0);

@@ -92,16 +92,20 @@ impl Cell {
             let jt2 = rng.random_range(-125.0..-30.0);
             let joints =
                 Joints::from_degrees([0.0, jt2, jt3, 0.0, Self::REACHING_JT5_DEGREES, 0.0]);
-            let mut start = *self;
-            start.ball = Ball {
-                centre: self.ball_showing(&joints, &features)?,
+            let camera = self.camera_pose(&joints);
+            let ball = Ball {
+                centre: self.ball_before(&camera, &features)?,
                 ..self.ball
             };
-            start.place_ball(start.ball.centre);
-            let kept = start.ball.centre.z > start.table + start.ball.radius
-                && start.circle(&joints).is_ok()
-                && start.reachable();
-            kept.then_some((start, joints))
+            let kept = ball.centre.z > self.table + ball.radius && {
+                let there = Self { ball, ..*self };
+                there.circle_from(&camera).is_ok() && there.reachable()
+            };
+            kept.then(|| {
+                let mut start = *self;
+                start.place_ball(ball.centre);
+                (start, joints)
+            })
         })
     }
 

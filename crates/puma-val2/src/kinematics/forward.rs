@@ -23,7 +23,6 @@ impl PumaParams {
     /// `JT4`, `JT5` and `JT6`, z along the tool axis. [`PumaParams::forward`] lies `d6` further
     /// along z.
     pub fn wrist(&self, joints: &Joints) -> Isometry3<f64> {
-        let (s, c) = (joints.0.map(f64::sin), joints.0.map(f64::cos));
         // Rz(theta) Tz(d) Tx(a) Rx(alpha) for each joint, with alpha a multiple of a quarter turn.
         let links: [(f64, f64, f64); 6] = [
             (-1.0, 0.0, 0.0),
@@ -33,23 +32,21 @@ impl PumaParams {
             (1.0, 0.0, 0.0),
             (0.0, 0.0, 0.0),
         ];
-        let mut rotation = Matrix3::identity();
+        let mut axes = [Vector3::x(), Vector3::y(), Vector3::z()];
         let mut position = Vector3::zeros();
-        for (i, &(sin_alpha, a, d)) in links.iter().enumerate() {
+        for (angle, (sin_alpha, a, d)) in joints.0.into_iter().zip(links) {
+            let (s, c) = angle.sin_cos();
             let cos_alpha = 1.0 - sin_alpha * sin_alpha;
-            position += rotation * Vector3::new(a * c[i], a * s[i], d);
-            rotation *= Matrix3::new(
-                c[i],
-                -s[i] * cos_alpha,
-                s[i] * sin_alpha,
-                s[i],
-                c[i] * cos_alpha,
-                -c[i] * sin_alpha,
-                0.0,
-                sin_alpha,
-                cos_alpha,
-            );
+            let [x, y, z] = axes;
+            position += x * (a * c) + y * (a * s) + z * d;
+            // Sums of columns: products of matrices take several times as long.
+            axes = [
+                x * c + y * s,
+                x * (-s * cos_alpha) + y * (c * cos_alpha) + z * sin_alpha,
+                x * (s * sin_alpha) + y * (-c * sin_alpha) + z * cos_alpha,
+            ];
         }
+        let rotation = Matrix3::from_columns(&axes);
         let rotation =
             UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
         Isometry3::from_parts(position.into(), rotation)
