@@ -3,13 +3,13 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use hough_heuristic::image::GrayImage;
-use numpy::ndarray::{Array1, Array2};
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
-use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
+use numpy::ndarray::Array2;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::task::Task;
+use crate::task::{Task, relative};
 use crate::world::{ErrorSetting, PICTURE, Setting, World};
 
 /// Most cells of a batch.
@@ -17,6 +17,9 @@ const MOST: usize = 1 << 20;
 
 /// Least number of cells of a thread.
 const TOGETHER: usize = 64;
+
+/// Largest value of an observation relative to the goal.
+const BOUND: f64 = 2.0;
 
 /// Observations, rewards, outcomes and truncations of a step.
 type Stepped<'py> = (
@@ -37,8 +40,8 @@ pub struct Cells {
 impl Cells {
     #[new]
     #[pyo3(signature = (
-        count, *, task="reaching", reward="paper", whole=false, frames=false, level="none",
-        odd=vec![], noise=None
+        count, *, task="reaching", reward="paper", whole=false, frames=false, scaled=false,
+        level="none", odd=vec![], noise=None
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn new(
@@ -47,6 +50,7 @@ impl Cells {
         reward: &str,
         whole: bool,
         frames: bool,
+        scaled: bool,
         level: &str,
         odd: Vec<String>,
         noise: Option<f64>,
@@ -64,7 +68,7 @@ impl Cells {
         let level = level.parse().map_err(value_error)?;
         let errors = ErrorSetting { level, odd, noise };
         let task = Task::new(task, reward)?;
-        let setting = Setting::new(task, whole, frames, errors).map_err(value_error)?;
+        let setting = Setting::new(task, whole, frames, scaled, errors).map_err(value_error)?;
         let worlds = (0..count).map(|index| World::new(index as u64)).collect();
         let worlds = Mutex::new(worlds);
         Ok(Self { setting, worlds })
@@ -73,7 +77,7 @@ impl Cells {
     /// Turns of `JT1`, `JT2` and `JT3` of each action of each behaviour, degrees.
     #[getter]
     fn moves(&self) -> Vec<Vec<[f64; 3]>> {
-        self.setting.task.moves()
+        self.setting.task.moves.clone()
     }
 
     /// Largest turn of `JT1`, `JT2` and `JT3`, degrees.
@@ -90,7 +94,7 @@ impl Cells {
 
     /// Begins the random numbers of each cell anew.
     fn seed(&self, seeds: PyReadonlyArray1<'_, u64>) -> PyResult<()> {
-        let mut worlds = self.lock();
+        let mut worlds = lock(&self.worlds);
         let seeds = seeds.as_array();
         same_length("seeds", seeds.len(), worlds.len())?;
         for (world, seed) in worlds.iter_mut().zip(seeds) {
@@ -107,67 +111,58 @@ impl Cells {
         marked: PyReadonlyArray1<'_, bool>,
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let marked = marked.as_array().to_vec();
-        let mut worlds = self.lock();
-        same_length("marks", marked.len(), worlds.len())?;
-        for (world, _) in worlds.iter_mut().zip(marked).filter(|(_, marked)| *marked) {
-            world
-                .reset(&self.setting)
+        let (setting, all) = (&self.setting, &self.worlds);
+        let observed = py.detach(move || {
+            let mut worlds = lock(all);
+            same_length("marks", marked.len(), worlds.len())?;
+            let all = worlds.par_iter_mut().zip(marked).with_min_len(TOGETHER);
+            all.filter(|(_, marked)| *marked)
+                .try_for_each(|(world, _)| world.reset(setting))
                 .map_err(PyRuntimeError::new_err)?;
-        }
-        Ok(PyArray2::from_owned_array(py, observations(&worlds)))
+            Ok::<_, PyErr>(observations(&worlds, setting))
+        })?;
+        Ok(PyArray2::from_owned_array(py, observed))
     }
 
-    /// Turns the joints of all cells by degrees of shape (cells, 3). A cell whose episode is over
+    /// Acts in all cells: a move of each behaviour (int64 of shape (cells, behaviours)), or turns
+    /// of the three joints in degrees (float64 of shape (cells, 3)). A cell whose episode is over
     /// is reset instead, with reward 0; one that has made `most` steps is truncated.
     fn step<'py>(
         &self,
         py: Python<'py>,
-        degrees: PyReadonlyArray2<'_, f64>,
+        actions: &Bound<'py, PyAny>,
         most: u32,
     ) -> PyResult<Stepped<'py>> {
-        let degrees = degrees.as_array();
-        let columns = degrees.ncols();
-        if columns != 3 || degrees.iter().any(|turn| !turn.is_finite()) {
-            let reason = "actions must be three finite turns a cell";
-            return Err(PyValueError::new_err(reason));
-        }
-        let degrees: Vec<[f64; 3]> = degrees.outer_iter().map(|t| [t[0], t[1], t[2]]).collect();
+        let degrees = self.degrees(actions)?;
         let (setting, all) = (&self.setting, &self.worlds);
         let stepped = py.detach(move || {
-            let mut worlds = all.lock().unwrap_or_else(PoisonError::into_inner);
-            if degrees.len() != worlds.len() {
-                return Err(format!(
-                    "{} actions for {} cells",
-                    degrees.len(),
-                    worlds.len()
-                ));
-            }
-            let count = worlds.len();
-            let mut rewards = Array1::zeros(count);
-            let mut outcomes = Array1::zeros(count);
-            let mut truncated = Array1::from_elem(count, false);
+            let mut worlds = lock(all);
+            same_length("actions", degrees.len(), worlds.len())?;
             let step = |(world, degrees): (&mut World, [f64; 3])| {
                 if world.over {
                     return world.reset(setting).map(|()| (0.0, 0, false));
                 }
-                let (reward, outcome) = world.step(&setting.task, degrees);
+                let (reward, outcome) = world.step(setting, degrees);
                 let truncated = world.steps >= most && !world.over;
                 world.over |= truncated;
                 Ok((reward, outcome as u8, truncated))
             };
             let all = worlds.par_iter_mut().zip(degrees).with_min_len(TOGETHER);
-            let ends: Vec<_> = all.map(step).collect::<Result<_, String>>()?;
-            for (i, end) in ends.into_iter().enumerate() {
-                (rewards[i], outcomes[i], truncated[i]) = end;
-            }
-            Ok((observations(&worlds), rewards, outcomes, truncated))
+            let ends: Result<Vec<_>, String> = all.map(step).collect();
+            let ends = ends.map_err(PyRuntimeError::new_err)?;
+            Ok::<_, PyErr>((
+                observations(&worlds, setting),
+                ends.iter().map(|end| end.0).collect::<Vec<f64>>(),
+                ends.iter().map(|end| end.1).collect::<Vec<u8>>(),
+                ends.iter().map(|end| end.2).collect::<Vec<bool>>(),
+            ))
         });
-        let (observed, rewards, outcomes, truncated) = stepped.map_err(PyRuntimeError::new_err)?;
+        let (observed, rewards, outcomes, truncated) = stepped?;
         Ok((
             PyArray2::from_owned_array(py, observed),
-            PyArray1::from_owned_array(py, rewards),
-            PyArray1::from_owned_array(py, outcomes),
-            PyArray1::from_owned_array(py, truncated),
+            PyArray1::from_vec(py, rewards),
+            PyArray1::from_vec(py, outcomes),
+            PyArray1::from_vec(py, truncated),
         ))
     }
 
@@ -176,22 +171,66 @@ impl Cells {
         self.of_one(cell, |world| Ok(world.degrees()))
     }
 
+    /// x, y and r of the ball as they were seen last in a cell, feature units.
+    fn features(&self, cell: usize) -> PyResult<(f64, f64, f64)> {
+        self.of_one(cell, |world| {
+            let seen = world.percept.features;
+            Ok((seen.x, seen.y, seen.r))
+        })
+    }
+
     /// The frame that is observed in a cell, of shape (144, 192).
     fn frame<'py>(&self, py: Python<'py>, cell: usize) -> PyResult<Bound<'py, PyArray2<u8>>> {
-        self.of_one(cell, World::frame)
-            .map(|frame| array(py, frame))
+        let frame = self.of_one(cell, |world| world.frame(&self.setting))?;
+        Ok(array(py, frame))
     }
 
     /// A picture from the camera of a cell, of shape (576, 768).
     fn picture<'py>(&self, py: Python<'py>, cell: usize) -> PyResult<Bound<'py, PyArray2<u8>>> {
-        let picture = self.of_one(cell, |world| world.picture(PICTURE))?;
+        let picture = self.of_one(cell, |world| world.picture(&self.setting, PICTURE))?;
         Ok(array(py, picture))
     }
 }
 
 impl Cells {
-    fn lock(&self) -> MutexGuard<'_, Vec<World>> {
-        self.worlds.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The turns of the three joints that actions stand for, degrees.
+    fn degrees(&self, actions: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
+        if let Ok(turns) = actions.cast::<PyArray2<f64>>() {
+            let turns = turns.try_readonly()?;
+            let turns = turns.as_array();
+            if turns.ncols() != 3 || turns.iter().any(|turn| !turn.is_finite()) {
+                let reason = "actions must be three finite turns a cell";
+                return Err(PyValueError::new_err(reason));
+            }
+            return Ok(turns.outer_iter().map(|t| [t[0], t[1], t[2]]).collect());
+        }
+        let moves = &self.setting.task.moves;
+        let chosen = actions.cast::<PyArray2<i64>>().map_err(|_| {
+            PyTypeError::new_err("actions must be of dtype int64 or float64, of two dimensions")
+        })?;
+        let chosen = chosen.try_readonly()?;
+        let chosen = chosen.as_array();
+        if chosen.ncols() != moves.len() {
+            let (found, needed) = (chosen.ncols(), moves.len());
+            let reason = format!("{found} actions a cell where {needed} are needed");
+            return Err(PyValueError::new_err(reason));
+        }
+        let turns = chosen.outer_iter().map(|actions| {
+            let mut summed = [0.0; 3];
+            for (moves, action) in moves.iter().zip(actions) {
+                let turns = usize::try_from(*action).ok().and_then(|at| moves.get(at));
+                let Some(turns) = turns else {
+                    let last = moves.len() - 1;
+                    let reason = format!("action {action} is not in 0..{last}");
+                    return Err(PyValueError::new_err(reason));
+                };
+                for (sum, turn) in summed.iter_mut().zip(turns) {
+                    *sum += turn;
+                }
+            }
+            Ok(summed)
+        });
+        turns.collect()
     }
 
     fn of_one<T>(
@@ -199,13 +238,17 @@ impl Cells {
         cell: usize,
         call: impl FnOnce(&mut World) -> Result<T, String>,
     ) -> PyResult<T> {
-        let mut worlds = self.lock();
+        let mut worlds = lock(&self.worlds);
         let count = worlds.len();
         let world = worlds
             .get_mut(cell)
             .ok_or_else(|| PyIndexError::new_err(format!("cell {cell} of a batch of {count}")))?;
         call(world).map_err(PyRuntimeError::new_err)
     }
+}
+
+fn lock(worlds: &Mutex<Vec<World>>) -> MutexGuard<'_, Vec<World>> {
+    worlds.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn value_error(error: impl std::fmt::Display) -> PyErr {
@@ -221,16 +264,17 @@ fn same_length(what: &str, found: usize, needed: usize) -> PyResult<()> {
     )))
 }
 
-fn observations(worlds: &[World]) -> Array2<f32> {
-    let mut all = Array2::zeros((worlds.len(), 4));
-    for (mut row, world) in all.outer_iter_mut().zip(worlds) {
-        let (features, theta3) = (world.percept.features, world.percept.theta3);
-        let values = [features.x, features.y, features.r, theta3];
-        for (cell, value) in row.iter_mut().zip(values) {
-            *cell = value as f32;
+/// x, y, r and theta 3 of each cell, or those relative to the goal within `BOUND`.
+fn observations(worlds: &[World], setting: &Setting) -> Array2<f32> {
+    let of = |world: &World| {
+        if setting.scaled {
+            return relative(&world.percept).map(|value| value.clamp(-BOUND, BOUND) as f32);
         }
-    }
-    all
+        let (features, theta3) = (world.percept.features, world.percept.theta3);
+        [features.x, features.y, features.r, theta3].map(|value| value as f32)
+    };
+    let all: Vec<f32> = worlds.iter().flat_map(of).collect();
+    Array2::from_shape_vec((worlds.len(), 4), all).unwrap_or_default()
 }
 
 fn array(py: Python<'_>, frame: GrayImage) -> Bound<'_, PyArray2<u8>> {

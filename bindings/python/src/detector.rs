@@ -4,7 +4,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
-    AContrario, AContrarioConfig, Channel, Circle, CircleDetector, Effort, FrameRefused,
+    AContrario, AContrarioConfig, Channel, Circle, CircleDetector, Effort, Ellipse, FrameRefused,
     Measurement, Region, Rings,
 };
 use numpy::PyArray2;
@@ -15,8 +15,8 @@ use pyo3::types::PyDict;
 
 use crate::frame;
 
-/// Columns of a result.
-const COLUMNS: usize = 10;
+/// Columns of a circle, and those of its ellipse after them.
+const COLUMNS: (usize, usize) = (10, 6);
 
 /// A detector with its buffers. Calls from several threads take turns.
 #[pyclass(frozen, module = "puma_grasp._native")]
@@ -25,6 +25,8 @@ pub struct Detector {
     /// The frame of the last call, for its memory, and the bits that its values used.
     last: Mutex<(GrayImage, Option<u32>)>,
     channel: Channel,
+    /// `true` if each result has an ellipse.
+    ellipses: bool,
 }
 
 #[pymethods]
@@ -32,8 +34,8 @@ impl Detector {
     #[new]
     #[pyo3(signature = (
         *, min_radius=None, max_radius=None, max_circles=None, rings="all", min_distance=0.0,
-        min_score=0.5, contrast=8.0, draws=50_000, time_limit=None, region=None, channel="luma",
-        seed=1
+        min_axis_ratio=1.0, min_score=0.5, contrast=8.0, draws=50_000, time_limit=None,
+        region=None, channel="luma", seed=1
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn new(
@@ -42,6 +44,7 @@ impl Detector {
         max_circles: Option<usize>,
         rings: &str,
         min_distance: f64,
+        min_axis_ratio: f64,
         min_score: f64,
         contrast: f64,
         draws: u32,
@@ -66,6 +69,7 @@ impl Detector {
                 }
             },
             min_distance,
+            min_axis_ratio,
             min_score,
             contrast,
             draws_per_megapixel: draws,
@@ -84,10 +88,11 @@ impl Detector {
             detector: Mutex::new(detector),
             last: Mutex::new((GrayImage::default(), None)),
             channel: frame::channel(channel)?,
+            ellipses: min_axis_ratio < 1.0,
         })
     }
 
-    /// Returns one row of ten numbers a circle, best first.
+    /// Returns one row of ten numbers a circle, best first; of sixteen with `min_axis_ratio`.
     fn detect<'py>(&self, image: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (rows, ()) = self.run(image, |detector, frame| detector.detect(frame).map(drop))?;
         Ok(rows)
@@ -140,7 +145,7 @@ impl Detector {
         let found = py.detach(|| {
             let mut detector = lock(&self.detector);
             let found = search(&mut detector, &frame);
-            found.map(|told| (rows(detector.measurements()), told))
+            found.map(|told| (rows(detector.measurements(), self.ellipses), told))
         });
         *lock(&self.last) = (frame, bits);
         let (rows, told) = found.map_err(value_error)?;
@@ -157,8 +162,13 @@ fn value_error(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-fn rows(measurements: &[Measurement]) -> Array2<f64> {
-    let mut rows = Array2::zeros((measurements.len(), COLUMNS));
+fn rows(measurements: &[Measurement], ellipses: bool) -> Array2<f64> {
+    let columns = if ellipses {
+        COLUMNS.0 + COLUMNS.1
+    } else {
+        COLUMNS.0
+    };
+    let mut rows = Array2::zeros((measurements.len(), columns));
     for (mut row, found) in rows.outer_iter_mut().zip(measurements) {
         let Measurement {
             circle: Circle { x, y, radius },
@@ -169,9 +179,9 @@ fn rows(measurements: &[Measurement]) -> Array2<f64> {
             axis_ratio,
             visible,
             covered,
-            ellipse: _,
+            ellipse,
         } = *found;
-        let values = [
+        let circle = [
             x,
             y,
             radius,
@@ -183,7 +193,18 @@ fn rows(measurements: &[Measurement]) -> Array2<f64> {
             radius_error,
             log_false_alarms,
         ];
-        for (cell, value) in row.iter_mut().zip(values) {
+        let ellipse = ellipse.map_or([f64::NAN; COLUMNS.1], |found| {
+            let Ellipse {
+                major,
+                minor,
+                angle,
+                ..
+            } = found.ellipse;
+            let (angle, angle_error) = (angle.to_degrees(), found.angle_error.to_degrees());
+            let (major_error, minor_error) = (found.major_error, found.minor_error);
+            [major, minor, angle, major_error, minor_error, angle_error]
+        });
+        for (cell, value) in row.iter_mut().zip(circle.into_iter().chain(ellipse)) {
             *cell = value;
         }
     }

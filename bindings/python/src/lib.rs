@@ -1,8 +1,10 @@
-//! The native part of the Python package `puma_grasp`: the detector and batches of cells.
+//! The native part of the Python package `puma_grasp`: the detector, batches of
+//! cells, and sweeps.
 
 mod cells;
 mod detector;
 mod frame;
+mod sweep;
 mod task;
 mod world;
 
@@ -14,4 +16,6 @@ mod _native {
     use crate::cells::Cells;
     #[pymodule_export]
     use crate::detector::Detector;
+    #[pymodule_export]
+    use crate::sweep::compare_controllers;
 }

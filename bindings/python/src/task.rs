@@ -2,7 +2,9 @@
 
 use grasp_agent::puma_val2::Joint;
 use grasp_agent::qtable::Action;
-use grasp_agent::{BehaviourPair, BehaviourSpec, Percept};
+use grasp_agent::{BehaviourPair, BehaviourSpec, Input, Percept};
+use hough_heuristic::Features;
+use pipeline_sim::Cell;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -16,7 +18,14 @@ pub enum Pay {
     Paper,
     /// 1 for success, -1 for failure.
     Sparse,
+    /// The way that the ball came closer to the goal, 5 for success, -5 for failure.
+    Shaped,
 }
+
+/// Pay for success and, below zero, for failure, if steps are paid as [`Pay::Shaped`].
+const SHAPED_END: f64 = 5.0;
+/// Cost of a step then.
+const SHAPED_STEP: f64 = 0.05;
 
 /// The end of a step; the numbers go to Python.
 #[derive(Clone, Copy, PartialEq)]
@@ -35,6 +44,8 @@ pub enum Outcome {
 pub struct Task {
     behaviours: Vec<BehaviourSpec>,
     pay: Pay,
+    /// Turns of `JT1`, `JT2` and `JT3` of each action of each behaviour, degrees.
+    pub moves: Vec<Vec<[f64; 3]>>,
 }
 
 impl Task {
@@ -56,23 +67,23 @@ impl Task {
         let pay = match reward {
             "paper" => Pay::Paper,
             "sparse" => Pay::Sparse,
+            "shaped" => Pay::Shaped,
             _ => {
                 return Err(PyValueError::new_err(format!(
-                    "reward is {reward:?}: use \"paper\" or \"sparse\""
+                    "reward is {reward:?}: use \"paper\", \"sparse\" or \"shaped\""
                 )));
             }
         };
-        Ok(Self { behaviours, pay })
-    }
-
-    /// Turns of `JT1`, `JT2` and `JT3` of each action of each behaviour, degrees.
-    pub fn moves(&self) -> Vec<Vec<[f64; 3]>> {
         let turns = |spec: &BehaviourSpec, action| {
             let [d1, d2, d3, ..] = spec.delta(Action(action)).degrees();
             [d1, d2, d3]
         };
         let of = |spec: &BehaviourSpec| (0..spec.actions()).map(|a| turns(spec, a)).collect();
-        self.behaviours.iter().map(of).collect()
+        Ok(Self {
+            moves: behaviours.iter().map(of).collect(),
+            behaviours,
+            pay,
+        })
     }
 
     /// Largest turn of each of the three joints, degrees.
@@ -107,13 +118,42 @@ impl Task {
         match (outcome, self.pay) {
             (Outcome::Reached | Outcome::Grasped, Pay::Paper) => reward.arrival(GAMMA),
             (Outcome::Reached | Outcome::Grasped, Pay::Sparse) => 1.0,
+            (Outcome::Reached | Outcome::Grasped, Pay::Shaped) => SHAPED_END,
             (Outcome::Continuing, Pay::Paper) => {
                 let steps = self.behaviours.iter();
                 steps.map(|spec| spec.reward.step(before, after)).sum()
             }
             (Outcome::Continuing, Pay::Sparse) => 0.0,
+            (Outcome::Continuing, Pay::Shaped) => self.off(before) - self.off(after) - SHAPED_STEP,
             (_, Pay::Paper) => reward.lost,
             (_, Pay::Sparse) => -1.0,
+            (_, Pay::Shaped) => -SHAPED_END,
         }
     }
+
+    /// Distance to the middle of the goal, about 1 for a quarter of the frame or a factor of e in
+    /// the radius.
+    fn off(&self, percept: &Percept) -> f64 {
+        let [x, y, r, _] = relative(percept);
+        let goals = self.behaviours.iter().flat_map(|spec| &spec.goal);
+        let off = goals.map(|goal| match goal.input {
+            Input::X => 2.0 * x.abs(),
+            Input::Y => 2.0 * y.abs(),
+            Input::R => r.abs(),
+            Input::Theta3 => 0.0,
+        });
+        off.sum()
+    }
+}
+
+/// x and y relative to the middle of the goal by half the frame, the logarithm of the radius
+/// relative to that there, and theta 3 by 45 degrees.
+pub fn relative(percept: &Percept) -> [f64; 4] {
+    let (seen, goal) = (&percept.features, Cell::GOAL);
+    [
+        (seen.x - goal.x) / (Features::WIDTH / 2.0),
+        (seen.y - goal.y) / (Features::HEIGHT / 2.0),
+        (seen.r.max(1.0) / goal.r).ln(),
+        percept.theta3 / 45.0,
+    ]
 }

@@ -3,6 +3,7 @@
 use grasp_agent::Percept;
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{Features, FrameSource};
+use pipeline_sim::nalgebra::Point3;
 use pipeline_sim::puma_val2::{Gripper, JointDelta, Joints, Manipulator};
 use pipeline_sim::rand::rngs::Xoshiro256PlusPlus;
 use pipeline_sim::rand::{Rng, RngExt, SeedableRng};
@@ -29,6 +30,8 @@ pub struct Setting {
     pub whole: bool,
     /// `true` if frames are observed.
     pub frames: bool,
+    /// `true` if features are observed relative to the goal.
+    pub scaled: bool,
     errors: ErrorSetting,
     nominal: Cell,
     /// The cell of every episode, if its errors are not drawn.
@@ -61,6 +64,7 @@ impl Setting {
         task: Task,
         whole: bool,
         frames: bool,
+        scaled: bool,
         errors: ErrorSetting,
     ) -> Result<Self, QuantityError> {
         let mut nominal = Cell::paper(Ball::at(0.6, 0.0, -0.1));
@@ -73,6 +77,7 @@ impl Setting {
             task,
             whole,
             frames,
+            scaled,
             fixed: (errors.level == ErrorLevel::None).then_some(first),
             errors,
             nominal,
@@ -99,16 +104,20 @@ struct Devices {
     camera: Option<CellCamera<Pose>>,
 }
 
+/// One cell and its episode. It is small, since a step of many goes through the memory of all.
 pub struct World {
     rng: Xoshiro256PlusPlus,
-    cell: SharedCell,
+    /// Centre of the ball at the start of the episode.
+    ball: Point3<f64>,
+    /// The cell of the episode, unless it is that of all and only the ball is another.
+    own: Option<SharedCell>,
     /// Angles of the joints as reported.
     joints: Joints,
     /// Angles of the links.
     links: Joints,
     noise: f64,
-    devices: Option<Devices>,
-    renderer: Option<Renderer>,
+    devices: Option<Box<Devices>>,
+    renderer: Option<Box<Renderer>>,
     pub percept: Percept,
     pub over: bool,
     pub steps: u32,
@@ -123,7 +132,8 @@ impl World {
         };
         Self {
             rng,
-            cell: SharedCell::new(Cell::paper(Ball::at(0.6, 0.0, -0.1))),
+            ball: Point3::origin(),
+            own: None,
             joints: Joints::default(),
             links: Joints::default(),
             noise: 0.0,
@@ -143,12 +153,12 @@ impl World {
 
     /// Draws a cell and a start of an episode.
     pub fn reset(&mut self, setting: &Setting) -> Result<(), String> {
+        self.over = true;
         for _ in 0..STARTS_TRIED {
-            let (cell, errors) = setting.cell(&mut self.rng).map_err(text)?;
             let seen = if setting.whole {
-                self.start_whole(cell, &errors, setting.frames)?
+                self.start_whole(setting)?
             } else {
-                self.start_shortcut(cell, &errors)
+                self.start_shortcut(setting)?
             };
             let Some(features) = seen else { continue };
             self.percept = Percept::new(features, &self.joints);
@@ -163,72 +173,99 @@ impl World {
         Ok(())
     }
 
-    fn start_shortcut(&mut self, cell: Cell, errors: &Errors) -> Option<Features> {
-        let (cell, joints) = cell.exploring_start(&mut self.rng)?;
-        self.cell.with(|shared| *shared = cell);
-        (self.joints, self.links) = (joints, joints);
-        (self.noise, self.devices) = (errors.feature_noise, None);
-        self.look()
+    fn start_shortcut(&mut self, setting: &Setting) -> Result<Option<Features>, String> {
+        let (drawn, noise);
+        let cell = match &setting.fixed {
+            Some((cell, errors)) => {
+                noise = errors.feature_noise;
+                cell
+            }
+            None => {
+                let (cell, errors) = setting.cell(&mut self.rng).map_err(text)?;
+                (drawn, noise) = (cell, errors.feature_noise);
+                &drawn
+            }
+        };
+        let Some((cell, joints)) = cell.exploring_start(&mut self.rng) else {
+            return Ok(None);
+        };
+        self.ball = cell.ball.centre;
+        if setting.fixed.is_none() {
+            self.own = Some(SharedCell::new(cell));
+        }
+        (self.joints, self.links, self.noise) = (joints, joints, noise);
+        Ok(self.look(setting))
     }
 
-    fn start_whole(
-        &mut self,
-        cell: Cell,
-        errors: &Errors,
-        frames: bool,
-    ) -> Result<Option<Features>, String> {
+    fn start_whole(&mut self, setting: &Setting) -> Result<Option<Features>, String> {
+        let (cell, errors) = setting.cell(&mut self.rng).map_err(text)?;
         let found = Workspace::paper().sample_seen_ball(&cell, &mut self.rng);
         let Some((ball, pose)) = found else {
             return Ok(None);
         };
-        self.cell = SharedCell::new(cell);
-        self.cell.set_errors(errors).map_err(text)?;
-        self.cell.place_ball(ball.centre, &pose);
-        let mut arm = SimulatedArm::new(self.cell.clone(), pose).map_err(text)?;
+        let shared = SharedCell::new(cell);
+        shared.set_errors(&errors).map_err(text)?;
+        shared.place_ball(ball.centre, &pose);
+        let mut arm = SimulatedArm::new(shared.clone(), pose).map_err(text)?;
         let seed = self.rng.random();
         let joints_of = |arm: &SimulatedArm| -> Pose { Box::new(arm.pose()) };
-        let features = FeatureCamera::new(self.cell.clone(), joints_of(&arm), seed);
-        let camera = frames.then(|| {
+        let features = FeatureCamera::new(shared.clone(), joints_of(&arm), seed);
+        let camera = setting.frames.then(|| {
             let renderer = Renderer::new(&Scene::laboratory(), seed);
-            CellCamera::new(self.cell.clone(), renderer, joints_of(&arm))
+            CellCamera::new(shared.clone(), renderer, joints_of(&arm))
         });
         self.joints = arm.joints().map_err(text)?;
         self.links = joints_of(&arm)();
-        self.devices = Some(Devices {
+        self.own = Some(shared);
+        self.devices = Some(Box::new(Devices {
             arm,
             features,
             camera,
-        });
-        Ok(self.look())
+        }));
+        Ok(self.look(setting))
+    }
+
+    /// The cell as it is now.
+    fn cell(&self, setting: &Setting) -> Cell {
+        if let Some(own) = &self.own {
+            return own.get();
+        }
+        let fixed = setting.fixed.as_ref().map(|(cell, _)| *cell);
+        let mut cell = fixed.unwrap_or(setting.nominal);
+        cell.ball.centre = self.ball;
+        cell
     }
 
     /// The features of the ball as they are seen now.
-    fn look(&mut self) -> Option<Features> {
+    fn look(&mut self, setting: &Setting) -> Option<Features> {
         if let Some(devices) = &mut self.devices {
             return devices.features.look();
         }
-        let joints = self.links;
-        let Features { x, y, r } = self.cell.with(|cell| cell.features(&joints)).ok()?;
+        let seen = self.cell(setting).features(&self.links).ok()?;
+        if self.noise == 0.0 {
+            return Some(seen);
+        }
+        let Features { x, y, r } = seen;
         let mut noisy = |value: f64| value + self.noise * standard_normal(&mut self.rng);
         Some(Features::new(noisy(x), noisy(y), noisy(r)))
     }
 
     /// Turns `JT1`, `JT2` and `JT3` by these degrees and returns the reward and the outcome. A turn
     /// that leaves the working range of its joint is left out.
-    pub fn step(&mut self, task: &Task, degrees: [f64; 3]) -> (f64, Outcome) {
-        let limits = self.cell.with(|cell| cell.limits);
+    pub fn step(&mut self, setting: &Setting, degrees: [f64; 3]) -> (f64, Outcome) {
         let mut target = self.joints;
         for (i, turn) in degrees.into_iter().enumerate() {
             let angle = target.0[i] + turn.to_radians();
-            if (limits[i].0..=limits[i].1).contains(&angle) {
+            let (low, high) = setting.nominal.limits[i];
+            if (low..=high).contains(&angle) {
                 target.0[i] = angle;
             }
         }
         self.steps += 1;
-        let before = self.percept;
+        let (task, before) = (&setting.task, self.percept);
         let outcome = if !self.go(target) || self.has_collided() {
             Outcome::Collided
-        } else if let Some(features) = self.look() {
+        } else if let Some(features) = self.look(setting) {
             self.percept = Percept::new(features, &self.joints);
             if !task.at_goal(&self.percept) {
                 Outcome::Continuing
@@ -259,23 +296,23 @@ impl World {
     }
 
     fn has_collided(&self) -> bool {
-        let joints = self.links;
-        self.devices.is_some()
-            && (self.cell.contacts().collisions > 0
-                || self.cell.with(|cell| cell.collides(&joints)))
+        let (Some(_), Some(cell)) = (&self.devices, &self.own) else {
+            return false;
+        };
+        cell.contacts().collisions > 0 || cell.with(|cell| cell.collides(&self.links))
     }
 
     /// Turns the hand down to the ball and closes the jaws.
     fn grip(&mut self) -> Outcome {
         let turn = JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, GRIP_DEGREES, 0.0]);
-        let Some(devices) = &mut self.devices else {
+        let (Some(devices), Some(cell)) = (&mut self.devices, &self.own) else {
             return Outcome::Reached;
         };
         let arm = &mut devices.arm;
         let done = arm
             .move_by(turn)
             .and_then(|_| arm.set_gripper(Gripper::Closed));
-        match self.cell.contacts().grasp {
+        match cell.contacts().grasp {
             Some(Grasp::Held) if done.is_ok() => Outcome::Grasped,
             _ => Outcome::Missed,
         }
@@ -287,7 +324,7 @@ impl World {
     }
 
     /// The frame that is observed.
-    pub fn frame(&mut self) -> Result<GrayImage, String> {
+    pub fn frame(&mut self, setting: &Setting) -> Result<GrayImage, String> {
         let mut frame = GrayImage::default();
         match self
             .devices
@@ -295,18 +332,25 @@ impl World {
             .and_then(|devices| devices.camera.as_mut())
         {
             Some(camera) => camera.grab(&mut frame).map_err(text)?,
-            None => frame = self.picture(FRAME)?,
+            None => frame = self.picture(setting, FRAME)?,
         }
         Ok(frame)
     }
 
     /// A picture from the camera on the hand, of this size.
-    pub fn picture(&mut self, (width, height): (u32, u32)) -> Result<GrayImage, String> {
-        let mut cell = self.cell.get();
+    pub fn picture(
+        &mut self,
+        setting: &Setting,
+        (width, height): (u32, u32),
+    ) -> Result<GrayImage, String> {
+        let mut cell = self.cell(setting);
+        if self.own.is_none() {
+            cell.place_ball(self.ball);
+        }
         cell.camera = cell.camera.resized(width, height).map_err(text)?;
         if self.renderer.is_none() {
             let seed = self.rng.random();
-            self.renderer = Some(Renderer::new(&Scene::laboratory(), seed));
+            self.renderer = Some(Box::new(Renderer::new(&Scene::laboratory(), seed)));
         }
         let renderer = self.renderer.as_mut().ok_or("no renderer")?;
         Ok(renderer.render(&cell, &self.links).clone())

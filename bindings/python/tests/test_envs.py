@@ -19,7 +19,7 @@ TASKS = ["reaching", "centering", "approaching"]
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize(
     ("observation", "actions", "task"),
-    list(itertools.product(["features", "frame"], ["discrete", "continuous"], TASKS)),
+    list(itertools.product(["features", "scaled", "frame"], ["discrete", "continuous"], TASKS)),
 )
 def test_gymnasium_accepts_them(name, observation, actions, task):
     env = gymnasium.make(
@@ -46,6 +46,29 @@ def test_the_moves_are_the_papers():
     env.step(41)
     turned = np.subtract(env.unwrapped._cells.joints(0), before)
     np.testing.assert_allclose(turned, [0, 0, 0.5, 0, 0, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_shaped_reward_adds_up_to_the_way(task):
+    env = gymnasium.make("PumaReach-v0", task=task, observation="scaled")
+    plain = gymnasium.make("PumaReach-v0", task=task)
+    (x, y, r, elbow), _ = plain.reset(seed=5)
+    scaled, _ = env.reset(seed=5)
+    expected = [(x - 103.5) / 96, (y - 78) / 72, np.log(r / 33), elbow / 45]
+    np.testing.assert_allclose(scaled, expected, atol=1e-5)
+    weights = {"centering": [2, 0, 0, 0], "approaching": [0, 2, 1, 0], "reaching": [2, 2, 1, 0]}
+    still = {"centering": 4, "approaching": 40, "reaching": [4, 40]}[task]
+    env.action_space.seed(1)
+    for episode in range(20):
+        off = [np.abs(env.reset(seed=episode)[0]) @ weights[task]]
+        for action in [still] + [env.action_space.sample() for _ in range(60)]:
+            seen, reward, ended, truncated, info = env.step(action)
+            if ended or truncated:
+                break
+            off.append(np.abs(seen) @ weights[task])
+            assert abs(reward - (off[-2] - off[-1] - 0.05)) < 1e-4
+        if ended:
+            assert reward == (5 if info["outcome"] == "reached" else -5)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -118,7 +141,7 @@ def test_frames_show_the_ball():
     shown = 0
     for seed in range(20):
         frame, _ = env.reset(seed=seed)
-        x, y, r, _ = env.unwrapped._seen
+        x, y, r = env.unwrapped._cells.features(0)
         found = puma_grasp.find_circles(frame[..., 0], min_radius=4)
         shown += any(np.hypot(found["x"] - x, found["y"] - y) < 1.5)
         after, *_ = env.step(np.array([0.3, 0.0, 0.0], np.float32))
@@ -158,6 +181,12 @@ def test_wrong_actions_are_refused():
         env.step(9)
     with pytest.raises(ValueError, match="0..8"):
         env.step(-1)
+    with pytest.raises(TypeError, match="whole numbers"):
+        env.step(1.5)
+    with pytest.raises(ValueError, match="one cell at a time"):
+        gymnasium.make_vec(
+            "PumaReach-v0", 2, vectorization_mode="vector_entry_point", observation="frame"
+        )
     env = PumaReach(actions="continuous")
     env.reset(seed=1)
     with pytest.raises(ValueError, match="finite"):

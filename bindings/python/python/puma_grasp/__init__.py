@@ -14,9 +14,10 @@ and Gymnasium is installed; see :mod:`puma_grasp.envs`.
 
 from importlib.util import find_spec as _find_spec
 
-from .circles import CIRCLE, Detector, find_circles
+from .circles import CIRCLE, ELLIPSE, Detector, find_circles
+from .sweeps import compare_controllers
 
-__all__ = ["CIRCLE", "Detector", "find_circles"]
+__all__ = ["CIRCLE", "ELLIPSE", "Detector", "compare_controllers", "find_circles"]
 __version__ = "0.1.0"
 
 if _find_spec("gymnasium") is not None:

@@ -3,6 +3,8 @@ from typing import Any, Optional, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+def compare_controllers(arguments: Sequence[str]) -> None: ...
+
 class Detector:
     def __init__(
         self,
@@ -12,6 +14,7 @@ class Detector:
         max_circles: Optional[int] = None,
         rings: str = "all",
         min_distance: float = 0.0,
+        min_axis_ratio: float = 1.0,
         min_score: float = 0.5,
         contrast: float = 8.0,
         draws: int = 50_000,
@@ -36,6 +39,7 @@ class Cells:
         reward: str = "paper",
         whole: bool = False,
         frames: bool = False,
+        scaled: bool = False,
         level: str = "none",
         odd: Sequence[str] = ...,
         noise: Optional[float] = None,
@@ -49,8 +53,9 @@ class Cells:
     def seed(self, seeds: NDArray[np.uint64]) -> None: ...
     def reset(self, marked: NDArray[np.bool_]) -> NDArray[np.float32]: ...
     def step(
-        self, degrees: NDArray[np.float64], most: int
+        self, actions: NDArray[Any], most: int
     ) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.uint8], NDArray[np.bool_]]: ...
     def joints(self, cell: int) -> tuple[float, ...]: ...
+    def features(self, cell: int) -> tuple[float, float, float]: ...
     def frame(self, cell: int) -> NDArray[np.uint8]: ...
     def picture(self, cell: int) -> NDArray[np.uint8]: ...

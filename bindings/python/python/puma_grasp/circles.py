@@ -30,6 +30,20 @@ CIRCLE = np.dtype(
     ]
 )
 
+#: Fields of an ellipse, found with ``min_axis_ratio`` below 1: those of a circle of its centre and
+#: area, and its half-axes.
+ELLIPSE = np.dtype(
+    CIRCLE.descr
+    + [
+        ("major", "f8"),  # half-axes, pixels
+        ("minor", "f8"),
+        ("angle", "f8"),  # of the longer one, degrees from the x axis toward the y axis, -90..90
+        ("major_error", "f8"),  # standard errors, pixels and degrees
+        ("minor_error", "f8"),
+        ("angle_error", "f8"),  # about 52 degrees where the axes are too alike to tell it
+    ]
+)
+
 
 class Settings(TypedDict, total=False):
     """Settings of :class:`Detector`, for type checkers."""
@@ -39,6 +53,7 @@ class Settings(TypedDict, total=False):
     max_circles: int
     rings: str
     min_distance: float
+    min_axis_ratio: float
     min_score: float
     contrast: float
     draws: int
@@ -64,6 +79,9 @@ class Detector:
         Circles returned of those about one centre.
     min_distance : float
         Smallest distance between the centres of two circles, pixels.
+    min_axis_ratio : float
+        Smallest ratio of the half-axes of an outline, 0.3..1. Below 1 ellipses are found too, and
+        results are of dtype :data:`ELLIPSE`. It takes several times as long.
     min_score : float
         Smallest score, 0..1.
     contrast : float
@@ -88,6 +106,7 @@ class Detector:
 
     def __init__(self, **settings: Unpack[Settings]) -> None:
         self._native = _native.Detector(**settings)
+        self._dtype = ELLIPSE if settings.get("min_axis_ratio", 1.0) < 1.0 else CIRCLE
 
     def detect(self, image: NDArray[Any]) -> NDArray[np.void]:
         """Find the circles in a picture.
@@ -101,7 +120,7 @@ class Detector:
         Returns
         -------
         numpy.ndarray
-            Circles of dtype :data:`CIRCLE`, best first.
+            Circles of dtype :data:`CIRCLE`, or :data:`ELLIPSE` with ``min_axis_ratio``, best first.
 
         Raises
         ------
@@ -110,7 +129,7 @@ class Detector:
         ValueError
             Another shape, values outside 0..1, or a region outside the frame.
         """
-        return self._native.detect(image).view(CIRCLE).reshape(-1)
+        return self._native.detect(image).view(self._dtype).reshape(-1)
 
     def track(
         self, image: NDArray[Any], last: Any, reach: float = 12.0
@@ -129,13 +148,13 @@ class Detector:
         Returns
         -------
         circles : numpy.ndarray
-            Circles of dtype :data:`CIRCLE`, best first.
+            As of :meth:`detect`.
         followed : bool
             True if the circle was found near ``last``.
         """
         x, y, radius = (float(last[i]) for i in range(3))
         rows, followed = self._native.track(image, (x, y, radius), reach)
-        return rows.view(CIRCLE).reshape(-1), followed
+        return rows.view(self._dtype).reshape(-1), followed
 
     @property
     def effort(self) -> dict[str, Any]:
