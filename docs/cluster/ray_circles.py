@@ -59,26 +59,22 @@ def draw_all(count, folder):
         pyarrow.parquet.write_table(table, folder / f"{first:09}.parquet")
 
 
-class Finder:
-    """A detector that lives as long as its worker."""
+def find(batch, settings, started=None):
+    """The circles in a batch of pictures; `started` is a folder for the names of processes."""
+    from puma_grasp import Detector
 
-    def __init__(self, settings, started=None):
-        from puma_grasp import Detector
-
-        self.detector = Detector(**settings)
-        if started:
-            (Path(started) / str(os.getpid())).touch()
-
-    def __call__(self, batch):
-        circles = {field: [] for field in FIELDS}
-        stored = batch["path"] if "path" in batch else map(io.BytesIO, batch["bytes"])
-        for picture in stored:
-            found = self.detector.detect(np.asarray(Image.open(picture).convert("L")))
-            for field in FIELDS:
-                circles[field].append(found[field].tolist())
-        kept = {name: column for name, column in batch.items() if name != "bytes"}
-        lists = {field: np.array([*rows, None], object)[:-1] for field, rows in circles.items()}
-        return {**kept, **lists, "process": np.full(len(batch["id"]), os.getpid())}
+    if started:
+        (Path(started) / str(os.getpid())).touch()
+    detector = Detector(**settings)
+    circles = {field: [] for field in FIELDS}
+    stored = batch["path"] if "path" in batch else map(io.BytesIO, batch["bytes"])
+    for picture in stored:
+        found = detector.detect(np.asarray(Image.open(picture).convert("L")))
+        for field in FIELDS:
+            circles[field].append(found[field].tolist())
+    kept = {name: column for name, column in batch.items() if name != "bytes"}
+    lists = {field: np.array([*rows, None], object)[:-1] for field, rows in circles.items()}
+    return {**kept, **lists, "process": np.full(len(batch["id"]), os.getpid())}
 
 
 def stored_pictures(folder):
@@ -92,7 +88,7 @@ def stored_pictures(folder):
 
 def find_alone(folder, out, settings, size):
     """Does the work in this process without Ray."""
-    finder, parquet, rows = Finder(settings), *stored_pictures(folder)
+    parquet, rows = stored_pictures(folder)
 
     def batches():
         for file in parquet:
@@ -103,7 +99,7 @@ def find_alone(folder, out, settings, size):
             yield {name: np.array([row[name] for row in part]) for name in ("id", "path")}
 
     for number, batch in enumerate(batches()):
-        columns = {name: list(column) for name, column in finder(batch).items()}
+        columns = {name: list(column) for name, column in find(batch, settings).items()}
         pyarrow.parquet.write_table(pyarrow.table(columns), out / f"{number:09}.parquet")
 
 
@@ -114,14 +110,17 @@ def find_by_ray(folder, out, settings, size, workers, kill):
     # The core beyond the workers reads and writes. RAY_ADDRESS joins a cluster instead.
     cores = None if "RAY_ADDRESS" in os.environ else workers + 1
     ray.init(num_cpus=cores, include_dashboard=False, log_to_driver=False, logging_level="ERROR")
-    ray.data.DataContext.get_current().enable_progress_bars = False
+    context = ray.data.DataContext.get_current()
+    context.enable_progress_bars = False
+    context.print_on_execution_start = False
     parquet, rows = stored_pictures(folder)
     pictures = ray.data.read_parquet(str(folder)) if parquet else ray.data.from_items(rows)
     with tempfile.TemporaryDirectory() as started:
+        # Tasks, not actors: Ray does the task of a worker that died again.
         found = pictures.map_batches(
-            Finder,
-            fn_constructor_args=(settings, started if kill else None),
-            compute=ray.data.ActorPoolStrategy(size=workers),
+            find,
+            fn_kwargs={"settings": settings, "started": started if kill else None},
+            compute=ray.data.TaskPoolStrategy(size=workers),
             batch_size=size,
             num_cpus=1,
         )
@@ -133,12 +132,13 @@ def find_by_ray(folder, out, settings, size, workers, kill):
 
 
 def kill_worker(started, seconds):
-    """Kills the first worker that began on this machine, by SIGKILL."""
-    while not (begun := sorted(Path(started).iterdir())):
+    """Kills the worker on this machine that began a batch last, by SIGKILL."""
+    while not any(Path(started).iterdir()):
         time.sleep(0.1)
     time.sleep(seconds)
-    os.kill(int(begun[0].name), signal.SIGKILL)
-    print(f"process {begun[0].name} was killed after {seconds:g} s", flush=True)
+    last = max(Path(started).iterdir(), key=lambda file: file.stat().st_mtime)
+    os.kill(int(last.name), signal.SIGKILL)
+    print(f"process {last.name} was killed after {seconds:g} s", flush=True)
 
 
 def main():
