@@ -9,7 +9,7 @@ use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::task::{Task, relative};
+use crate::task::{Outcome, Task, relative};
 use crate::world::{ErrorSetting, PICTURE, Setting, World};
 
 /// Most cells of a batch.
@@ -119,7 +119,8 @@ impl Cells {
             all.filter(|(_, marked)| *marked)
                 .try_for_each(|(world, _)| world.reset(setting))
                 .map_err(PyRuntimeError::new_err)?;
-            Ok::<_, PyErr>(observations(&worlds, setting))
+            let observed = worlds.iter().map(|world| observation(world, setting));
+            Ok::<_, PyErr>(rows(observed.collect()))
         })?;
         Ok(PyArray2::from_owned_array(py, observed))
     }
@@ -139,22 +140,29 @@ impl Cells {
             let mut worlds = lock(all);
             same_length("actions", degrees.len(), worlds.len())?;
             let step = |(world, degrees): (&mut World, [f64; 3])| {
+                let (mut reward, mut outcome, mut truncated) = (0.0, Outcome::Continuing, false);
                 if world.over {
-                    return world.reset(setting).map(|()| (0.0, 0, false));
+                    world.reset(setting)?;
+                } else {
+                    (reward, outcome) = world.step(setting, degrees);
+                    truncated = world.steps >= most && !world.over;
+                    world.over |= truncated;
                 }
-                let (reward, outcome) = world.step(setting, degrees);
-                let truncated = world.steps >= most && !world.over;
-                world.over |= truncated;
-                Ok((reward, outcome as u8, truncated))
+                Ok((
+                    observation(world, setting),
+                    reward,
+                    outcome as u8,
+                    truncated,
+                ))
             };
             let all = worlds.par_iter_mut().zip(degrees).with_min_len(TOGETHER);
             let ends: Result<Vec<_>, String> = all.map(step).collect();
             let ends = ends.map_err(PyRuntimeError::new_err)?;
             Ok::<_, PyErr>((
-                observations(&worlds, setting),
-                ends.iter().map(|end| end.0).collect::<Vec<f64>>(),
-                ends.iter().map(|end| end.1).collect::<Vec<u8>>(),
-                ends.iter().map(|end| end.2).collect::<Vec<bool>>(),
+                rows(ends.iter().map(|end| end.0).collect()),
+                ends.iter().map(|end| end.1).collect::<Vec<f64>>(),
+                ends.iter().map(|end| end.2).collect::<Vec<u8>>(),
+                ends.iter().map(|end| end.3).collect::<Vec<bool>>(),
             ))
         });
         let (observed, rewards, outcomes, truncated) = stepped?;
@@ -264,17 +272,18 @@ fn same_length(what: &str, found: usize, needed: usize) -> PyResult<()> {
     )))
 }
 
-/// x, y, r and theta 3 of each cell, or those relative to the goal within `BOUND`.
-fn observations(worlds: &[World], setting: &Setting) -> Array2<f32> {
-    let of = |world: &World| {
-        if setting.scaled {
-            return relative(&world.percept).map(|value| value.clamp(-BOUND, BOUND) as f32);
-        }
-        let (features, theta3) = (world.percept.features, world.percept.theta3);
-        [features.x, features.y, features.r, theta3].map(|value| value as f32)
-    };
-    let all: Vec<f32> = worlds.iter().flat_map(of).collect();
-    Array2::from_shape_vec((worlds.len(), 4), all).unwrap_or_default()
+/// x, y, r and theta 3 of a cell, or those relative to the goal within `BOUND`.
+fn observation(world: &World, setting: &Setting) -> [f32; 4] {
+    if setting.scaled {
+        return relative(&world.percept).map(|value| value.clamp(-BOUND, BOUND) as f32);
+    }
+    let (features, theta3) = (world.percept.features, world.percept.theta3);
+    [features.x, features.y, features.r, theta3].map(|value| value as f32)
+}
+
+fn rows(all: Vec<[f32; 4]>) -> Array2<f32> {
+    let shape = (all.len(), 4);
+    Array2::from_shape_vec(shape, all.into_flattened()).unwrap_or_default()
 }
 
 fn array(py: Python<'_>, frame: GrayImage) -> Bound<'_, PyArray2<u8>> {

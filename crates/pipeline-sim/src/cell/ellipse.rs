@@ -57,8 +57,13 @@ impl ProjectedEllipse {
     /// the eccentric angle, which is close to the length for a nearly round outline.
     pub fn share_inside(&self, width: u32, height: u32) -> f64 {
         let (right, bottom) = (f64::from(width) - 0.5, f64::from(height) - 0.5);
-        let (w, h) = self.half_extent();
         let (x, y) = (self.centre.x, self.centre.y);
+        // No half extent is above the longer axis.
+        let inside = |at: f64, last: f64| at - self.major >= -0.5 && at + self.major <= last;
+        if inside(x, right) && inside(y, bottom) {
+            return 1.0;
+        }
+        let (w, h) = self.half_extent();
         if x - w >= -0.5 && x + w <= right && y - h >= -0.5 && y + h <= bottom {
             return 1.0;
         }
