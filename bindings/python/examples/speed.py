@@ -33,8 +33,13 @@ def main():
         env = gymnasium.make_vec(name, cells, vectorization_mode="vector_entry_point")
         env.reset(seed=1)
         actions = [env.action_space.sample() for _ in range(8)]
+        begun, steps = time.process_time(), 9 * 4 * 8 * cells
         step = per_call(lambda: [env.step(action) for action in actions], 4) / 8
-        print(f"{name}, {cells} cells, random actions: {cells / step:.2f} million steps/s")
+        cpu = (time.process_time() - begun) / steps * 1e6
+        print(
+            f"{name}, {cells} cells, random actions: {cells / step:.2f} million steps/s, "
+            f"{cpu:.2f} us of CPU time a step"
+        )
     env = gymnasium.make("PumaReach-v0", observation="frame", task="centering")
     env.reset(seed=1)
     frame = per_call(lambda: (env.reset(), env.step(4)), 20) / 2
