@@ -6,7 +6,7 @@
 #   . docs/cluster/one_node_slurm.sh /tmp/slurm     # sets SLURM_CONF
 #   sinfo
 #
-# Stop it with: pkill slurmctld; pkill slurmd; pkill munged
+# Stop it with: kill $(pidof slurmctld slurmd munged)
 folder=${1:-/tmp/slurm}
 host=$(hostname -s)
 mkdir -p "$folder"/{spool,state,log} /run/munge

@@ -33,17 +33,16 @@ import pyarrow.parquet
 from PIL import Image
 
 FIELDS = ("x", "y", "radius", "score")
-SIZE = 64
 #: Pictures of a file that is drawn, and of a batch.
 TOGETHER = 1000
 
 
-def draw(number):
+def draw(number, size):
     """A noisy picture of one disc whose place and size follow from its number, as PNG."""
     rng = np.random.default_rng(number)
-    x, y = rng.uniform(22, SIZE - 22, 2)
+    x, y = rng.uniform(22, size - 22, 2)
     radius = rng.uniform(9, 20)
-    rows, columns = np.ogrid[:SIZE, :SIZE]
+    rows, columns = np.ogrid[:size, :size]
     picture = np.where(np.hypot(columns - x, rows - y) < radius, 60, 180)
     picture = picture + rng.integers(-3, 4, picture.shape)
     png = io.BytesIO()
@@ -51,11 +50,11 @@ def draw(number):
     return png.getvalue()
 
 
-def draw_all(count, folder):
+def draw_all(count, size, folder):
     folder.mkdir(parents=True, exist_ok=True)
     for first in range(0, count, TOGETHER):
         ids = list(range(first, min(first + TOGETHER, count)))
-        table = pyarrow.table({"id": ids, "bytes": [draw(number) for number in ids]})
+        table = pyarrow.table({"id": ids, "bytes": [draw(number, size) for number in ids]})
         pyarrow.parquet.write_table(table, folder / f"{first:09}.parquet")
 
 
@@ -114,6 +113,8 @@ def find_by_ray(folder, out, settings, size, workers, kill):
     context.enable_progress_bars = False
     context.print_on_execution_start = False
     parquet, rows = stored_pictures(folder)
+    # Tasks of moderate size: that of a worker that dies is done again from its beginning.
+    context.target_max_block_size = 8 << 20
     pictures = ray.data.read_parquet(str(folder)) if parquet else ray.data.from_items(rows)
     with tempfile.TemporaryDirectory() as started:
         # Tasks, not actors: Ray does the task of a worker that died again.
@@ -148,6 +149,7 @@ def main():
     parser.add_argument("pictures", type=Path, help="folder of the pictures")
     parser.add_argument("out", type=Path, nargs="?", help="new folder for the result")
     parser.add_argument("--draw", type=int, metavar="N", help="draw N pictures, and end")
+    parser.add_argument("--size", type=int, default=64, help="side of a drawn picture [64]")
     parser.add_argument("--workers", type=int, default=2, help="worker processes [2]")
     parser.add_argument("--batch", type=int, default=TOGETHER, help="pictures of a batch [1000]")
     parser.add_argument("--min-radius", type=float, default=8.0, help="pixels [8]")
@@ -155,7 +157,7 @@ def main():
     parser.add_argument("--kill", type=float, metavar="S", help="kill a worker after S seconds")
     options = parser.parse_args()
     if options.draw:
-        return draw_all(options.draw, options.pictures)
+        return draw_all(options.draw, options.size, options.pictures)
     if options.out is None:
         parser.error("the folder for the result is missing")
     options.out.mkdir(parents=True, exist_ok=True)

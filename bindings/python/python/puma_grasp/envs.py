@@ -215,7 +215,7 @@ class PumaCell(PumaReach):
 
 
 class PumaReachVector(VectorEnv[Any, Any, Any]):
-    """Many cells that step together in native code, with features or scaled features as observations.
+    """Many cells that step together in native code; observations are features, scaled or not.
 
     An episode that has ended begins anew at the next step, whose action is ignored
     (``AutoresetMode.NEXT_STEP``). ``info["outcome"]`` is an array of indices of :data:`OUTCOMES`.

@@ -300,16 +300,12 @@ impl Cell {
     /// Returns the place at which the image shows a ball with these features; `None` if there is
     /// none.
     pub fn ball_showing(&self, joints: &Joints, features: &Features) -> Option<Point3<f64>> {
-        self.ball_before(&self.camera_pose(joints), features)
+        self.ball_at(&self.camera_pose(joints), features)
     }
 
     /// Returns the place at which a camera at this pose shows a ball with these features.
-    pub(crate) fn ball_before(
-        &self,
-        camera: &Isometry3<f64>,
-        features: &Features,
-    ) -> Option<Point3<f64>> {
-        let circle = features.to_circle(self.camera.size().0);
+    pub(crate) fn ball_at(&self, camera: &Isometry3<f64>, seen: &Features) -> Option<Point3<f64>> {
+        let circle = seen.to_circle(self.camera.size().0);
         let centre = self.camera.sphere_of_circle(&circle, self.ball.radius)?;
         Some(camera * centre)
     }
@@ -338,7 +334,7 @@ impl Cell {
         let hand = Joints::from_degrees([0.0, 0.0, 0.0, 0.0, jt5_degrees, 0.0]);
         let wrist = params.wrist(&hand);
         let goal = self
-            .ball_before(&(wrist * self.mount), &Self::GOAL)
+            .ball_at(&(wrist * self.mount), &Self::GOAL)
             .ok_or(SightError::NoView)?;
         let mut in_hand = wrist.inverse_transform_point(&goal);
         in_hand.y = 0.0;

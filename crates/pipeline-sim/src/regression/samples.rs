@@ -94,7 +94,7 @@ impl Cell {
                 Joints::from_degrees([0.0, jt2, jt3, 0.0, Self::REACHING_JT5_DEGREES, 0.0]);
             let camera = self.camera_pose(&joints);
             let ball = Ball {
-                centre: self.ball_before(&camera, &features)?,
+                centre: self.ball_at(&camera, &features)?,
                 ..self.ball
             };
             let kept = ball.centre.z > self.table + ball.radius && {
