@@ -81,7 +81,6 @@ impl Detector {
                 height,
             }),
             seed,
-            ..default
         };
         let detector = AContrario::new(config).map_err(value_error)?;
         Ok(Self {
