@@ -89,7 +89,7 @@ impl BallDetector {
         Ok(match self {
             Self::AContrario => {
                 let config = AContrarioConfig {
-                    min_radius: radii.0,
+                    min_radius: Some(radii.0),
                     max_radius: Some(radii.1),
                     max_circles: 1,
                     min_score: MIN_SCORE,

@@ -81,7 +81,7 @@ impl Thing {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let count = |thing: Thing, min_radius: f64| -> Result<usize, Box<dyn std::error::Error>> {
         let mut detector = AContrario::new(AContrarioConfig {
-            min_radius,
+            min_radius: Some(min_radius),
             ..AContrarioConfig::default()
         })?;
         let mut hits = 0;

@@ -55,7 +55,7 @@ impl Detector {
     ) -> PyResult<Self> {
         let default = AContrarioConfig::default();
         let config = AContrarioConfig {
-            min_radius: min_radius.unwrap_or(default.min_radius),
+            min_radius,
             max_radius,
             max_circles: max_circles.unwrap_or(default.max_circles),
             rings: match rings {

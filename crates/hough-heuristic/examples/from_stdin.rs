@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut config = AContrarioConfig::default();
     let mut words = std::env::args().skip(1);
     if let Some(word) = words.next() {
-        config.min_radius = word.parse()?;
+        config.min_radius = Some(word.parse()?);
     }
     config.max_radius = words.next().map(|word| word.parse()).transpose()?;
     let mut detector = AContrario::new(config)?;

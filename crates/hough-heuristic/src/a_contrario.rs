@@ -198,8 +198,9 @@ impl AContrario {
     }
 
     /// Finds the circles of a frame with radii in this range, or about the one radius, into
-    /// `measurements`.
-    fn find(&mut self, frame: &GrayImage, radii: (f64, f64)) {
+    /// `measurements`. Those below the radius `first` are sought only if small closed outlines are
+    /// seen.
+    fn find(&mut self, frame: &GrayImage, radii: (f64, f64), first: f64) {
         self.proofs.clear();
         self.measurements.clear();
         self.reported.clear();
@@ -223,7 +224,7 @@ impl AContrario {
         };
         let noise = noise_deviation(frame.as_raw(), frame.width() as usize, rows);
         self.shrink(frame, radii.1);
-        self.prove(frame, radii, noise);
+        self.prove(frame, radii, first, noise);
         self.report(frame, radii, noise);
         if self.config.min_axis_ratio < 1.0 {
             self.find_ellipses(frame, radii, noise);
@@ -254,7 +255,11 @@ impl AContrario {
     }
 
     /// Collects candidates from the smallest size to the largest, and proves them.
-    fn prove(&mut self, frame: &GrayImage, radii: (f64, f64), noise: f32) {
+    fn prove(&mut self, frame: &GrayImage, radii: (f64, f64), first: f64, noise: f32) {
+        let least = radii.0;
+        // A frame that is not halved is searched at the full size anyway.
+        let first = if self.depth > 0 { first } else { least };
+        let radii = (least.max(first), radii.1);
         let pyramid = Pyramid {
             frame,
             sizes: &self.sizes[..self.depth],
@@ -271,12 +276,14 @@ impl AContrario {
         let finest = usize::from(radii.0 >= 8.0 && smallest > 0);
         let contrast = self.config.contrast as f32;
         let deadline = self.budget.deadline;
-        let edges_of = |depth: usize, edges: &mut Edges| {
+        let mirror_slack = if noise > 12.0 { 0.35 } else { 0.28 };
+        let edges_of = |depth: usize, edges: &mut Edges, asks: bool| {
             let Edges {
                 maxima,
                 thinning,
                 level,
                 late,
+                small,
             } = edges;
             let gray = pyramid.gray(depth);
             let noise = noise / (1 << depth) as f32 + ROUNDING;
@@ -292,59 +299,71 @@ impl AContrario {
                 level.fill(0, 0, &[]);
                 return;
             }
+            if asks {
+                // Small outlines are dense: all of their points are needed.
+                level.fill(gray.width, gray.height, points);
+                *small = search::shows_small(&self.outline, level, mirror_slack);
+            }
             let points = thinning.strongest(points, (gray.width, gray.height));
             level.fill(gray.width, gray.height, points);
         };
-        let mut search = |depth: usize, level: &mut Level| {
-            let scale = (1 << depth) as f32;
-            self.budget.begin_size(depth == finest);
-            for proof in prover.proofs.iter().filter(|proof| proof.is_beyond_doubt()) {
-                let ring = proof.in_frame().shrunk(scale);
-                self.outline
-                    .explain(&self.circle, level, &ring, &mut self.budget.looks);
-            }
-            let least = if depth == finest { 3.2 } else { 8.0 };
-            // Smaller sizes have the larger circles; but short arcs of them are exact in the larger
-            // ones only.
-            let (most, most_of_arcs) = if depth == smallest {
-                (f32::MAX, f32::MAX)
-            } else {
-                (20.0, 60.0)
+        let mut search =
+            |depth, level: &mut Level, radii: (f64, f64), budget: &mut Budget, last| {
+                let scale = (1 << depth) as f32;
+                budget.begin_size(last);
+                for proof in prover.proofs.iter().filter(|proof| proof.is_beyond_doubt()) {
+                    let ring = proof.in_frame().shrunk(scale);
+                    self.outline
+                        .explain(&self.circle, level, &ring, &mut budget.looks);
+                }
+                let least = if depth <= finest { 3.2 } else { 8.0 };
+                // Smaller sizes have the larger circles; but short arcs of them are exact in the
+                // larger ones only.
+                let (most, most_of_arcs) = if depth == smallest {
+                    (f32::MAX, f32::MAX)
+                } else {
+                    (20.0, 60.0)
+                };
+                widest(Searching {
+                    search: Search {
+                        circle: &self.circle,
+                        outline: &self.outline,
+                        radii: (
+                            (radii.0 as f32 / scale).max(least),
+                            (radii.1 as f32 / scale).min(most),
+                        ),
+                        most_radius: (radii.1 as f32 / scale).min(most_of_arcs),
+                        scale,
+                        seed: self.config.seed,
+                        mirror_slack,
+                    },
+                    prover: &mut prover,
+                    level,
+                    collected: &mut self.collected,
+                    budget,
+                });
             };
-            widest(Searching {
-                search: Search {
-                    circle: &self.circle,
-                    outline: &self.outline,
-                    radii: (
-                        (radii.0 as f32 / scale).max(least),
-                        (radii.1 as f32 / scale).min(most),
-                    ),
-                    most_radius: (radii.1 as f32 / scale).min(most_of_arcs),
-                    scale,
-                    seed: self.config.seed,
-                    mirror_slack: if noise > 12.0 { 0.35 } else { 0.28 },
-                },
-                prover: &mut prover,
-                level,
-                collected: &mut self.collected,
-                budget: &mut self.budget,
-            });
-        };
         let [coarse, fine] = &mut self.edges;
-        (coarse.late, fine.late) = (false, false);
+        (coarse.late, fine.late, fine.small) = (false, false, false);
         // The edges of the finest size take about as long as all that is done at the others, and
         // come last so that a deadline leaves the circles of these.
         both(
             frame.len() >= LARGE_FRAME,
             || {
                 for depth in (finest + 1..=smallest).rev() {
-                    edges_of(depth, coarse);
-                    search(depth, &mut coarse.level);
+                    edges_of(depth, coarse, false);
+                    search(depth, &mut coarse.level, radii, &mut self.budget, false);
                 }
             },
-            || edges_of(finest, fine),
+            || edges_of(finest, fine, least < radii.0),
         );
-        search(finest, &mut fine.level);
+        let (level, small) = (&mut fine.level, fine.small);
+        self.budget.extend(small);
+        search(finest, level, radii, &mut self.budget, !small);
+        if small {
+            edges_of(0, fine, false);
+            search(0, &mut fine.level, (least, first), &mut self.budget, true);
+        }
         self.budget.spent |= fine.late || coarse.late;
         let found = &mut self.collected;
         found
@@ -389,7 +408,7 @@ pub fn detect_circles(
     max_radius: f64,
 ) -> Result<(Vec<Detection>, Effort), ConfigError> {
     let config = AContrarioConfig {
-        min_radius,
+        min_radius: Some(min_radius),
         max_radius: Some(max_radius),
         ..AContrarioConfig::default()
     };
@@ -441,6 +460,8 @@ struct Edges {
     level: Level,
     /// Set once a deadline has left out edges of the frame.
     late: bool,
+    /// Set if small closed outlines are seen.
+    small: bool,
 }
 
 impl Edges {
@@ -450,6 +471,7 @@ impl Edges {
             thinning: Thinning::default(),
             level: Level::default(),
             late: false,
+            small: false,
         }
     }
 }

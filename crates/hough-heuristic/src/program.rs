@@ -38,9 +38,10 @@ struct Options {
     #[arg(long, value_enum, default_value_t = DetectorName::AContrario)]
     detector: DetectorName,
 
-    /// Smallest radius, pixels
-    #[arg(long, value_name = "PX", default_value_t = 8.0)]
-    min_radius: f64,
+    /// Smallest radius, pixels [default: 8, or 4 if small circles are seen; 8 for the other
+    /// detectors]
+    #[arg(long, value_name = "PX")]
+    min_radius: Option<f64>,
 
     /// Largest radius, pixels [default: 0.52 of the shorter side; 280 for the other detectors]
     #[arg(long, value_name = "PX")]

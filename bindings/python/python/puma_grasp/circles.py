@@ -72,7 +72,8 @@ class Detector:
     Parameters
     ----------
     min_radius, max_radius : float, optional
-        Range of radii in pixels (defaults 8 and 0.52 of the shorter side of the frame).
+        Range of radii in pixels (defaults 8, or 4 if small closed outlines are seen, and 0.52 of
+        the shorter side of the frame).
     max_circles : int, optional
         Largest number of circles, best first (default: all).
     rings : {"all", "outer", "inner"}

@@ -86,6 +86,13 @@ impl Budget {
         self.most_draws_of_size += DRAWS_PER_CIRCLE;
     }
 
+    /// Doubles the work allowed if one more size is searched.
+    pub(super) fn extend(&mut self, one_more: bool) {
+        let factor = if one_more { 2 } else { 1 };
+        self.most_draws *= factor;
+        self.most_looks = self.most_looks.map(|most| factor * most);
+    }
+
     /// Begins the search of a size, which leaves half of the work to those after it.
     pub(super) fn begin_size(&mut self, is_last: bool) {
         let share = |most: u64, spent: u64| {

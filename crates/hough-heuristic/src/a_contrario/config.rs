@@ -4,6 +4,8 @@ use super::rings::Rings;
 use crate::error::{ConfigError, require, require_radii, require_some};
 use crate::region::Region;
 
+/// Smallest radius that is possible, pixels.
+const SMALLEST: f64 = 4.0;
 /// Default of the largest radius, in shorter sides of the frame.
 const LARGEST: f64 = 0.52;
 /// Least default of the largest radius beside a small region, pixels.
@@ -16,14 +18,15 @@ const LARGEST_IN_REGION: f64 = 280.0;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct AContrarioConfig {
-    /// Smallest radius, pixels (default 8; 4..=max_radius). Below 8 the full size of the frame is
-    /// searched too, which takes several times as long.
-    pub min_radius: f64,
-    /// Largest radius, pixels (min_radius..=100000). The default, None, is 0.52 of the shorter side
-    /// of the frame. With a `region` it is 0.52 of the region's shorter side, but not below 280 px
-    /// and not above the default without a region. If `max_radius` equals `min_radius`, the radius
-    /// is known: circles whose measured radius differs from it by at most 1 px plus 5 % are
-    /// reported with the known radius.
+    /// Smallest radius, pixels (4..=max_radius). Below 8 the full size of the frame is searched
+    /// too, which takes several times as long. The default, None, is 4 px if small closed outlines
+    /// are seen in the frame halved once, and 8 px otherwise.
+    pub min_radius: Option<f64>,
+    /// Largest radius, pixels (min_radius or 8, ..=100000). The default, None, is 0.52 of the
+    /// shorter side of the frame. With a `region` it is 0.52 of the region's shorter side, but not
+    /// below 280 px and not above the default without a region. If `max_radius` equals
+    /// `min_radius`, the radius is known: circles whose measured radius differs from it by at most
+    /// 1 px plus 5 % are reported with the known radius.
     pub max_radius: Option<f64>,
     /// Largest number of circles reported, best first (default: all; at least 1).
     pub max_circles: usize,
@@ -45,7 +48,8 @@ pub struct AContrarioConfig {
     /// 128). Smaller values find fainter circles and take longer. Noise raises the contrast used.
     pub contrast: f64,
     /// Largest number of pairs drawn per million pixels of the frame (default 50000; at least 1).
-    /// A smaller frame than 250,000 pixels counts as that many. Each draw adds 16 looks to the
+    /// A smaller frame than 250,000 pixels counts as that many. One in which circles below 8 px are
+    /// sought by default counts twice. Each draw adds 16 looks to the
     /// sample budget, which bounds all work that depends on the frame's content
     /// ([`Effort::looks`](crate::Effort::looks)). Each circle found adds 50 draws and 8,000 looks.
     /// Smaller values miss circles amid dense texture.
@@ -64,7 +68,7 @@ pub struct AContrarioConfig {
 impl Default for AContrarioConfig {
     fn default() -> Self {
         Self {
-            min_radius: 8.0,
+            min_radius: None,
             max_radius: None,
             max_circles: usize::MAX,
             rings: Rings::All,
@@ -82,7 +86,7 @@ impl Default for AContrarioConfig {
 
 impl AContrarioConfig {
     pub(super) fn check(&self) -> Result<(), ConfigError> {
-        let (min, score, contrast) = (self.min_radius, self.min_score, self.contrast);
+        let (min, score, contrast) = (self.first_radius(), self.min_score, self.contrast);
         require_radii(min, self.max_radius.unwrap_or(min))?;
         require("min_radius", min, "at least 4", min >= 4.0)?;
         require_some("max_circles", self.max_circles)?;
@@ -102,9 +106,14 @@ impl AContrarioConfig {
         self.region.map_or(Ok(()), |region| region.check())
     }
 
+    /// The smallest radius that is always searched.
+    pub(super) fn first_radius(&self) -> f64 {
+        self.min_radius.unwrap_or(8.0)
+    }
+
     /// The radius, if only one is allowed.
     pub(super) fn known_radius(&self) -> Option<f64> {
-        self.max_radius.filter(|max| self.min_radius >= *max)
+        self.max_radius.filter(|max| self.first_radius() >= *max)
     }
 
     /// Returns the smallest and the largest radius for a frame of this size.
@@ -117,7 +126,7 @@ impl AContrarioConfig {
             .map_or(by_frame, |region| by_region(region).min(by_frame));
         let max = self
             .max_radius
-            .unwrap_or(default.max(self.min_radius + 1.0));
-        (self.min_radius, max)
+            .unwrap_or(default.max(self.first_radius() + 1.0));
+        (self.min_radius.unwrap_or(SMALLEST.min(max)), max)
     }
 }

@@ -15,6 +15,7 @@ impl AContrario {
     pub(super) fn find_in_region(&mut self, frame: &GrayImage) -> Result<(), FrameRefused> {
         let (width, height) = frame.dimensions();
         let radii = self.config.radii(width, height);
+        let first = self.config.first_radius();
         let whole = Region {
             left: 0,
             top: 0,
@@ -25,7 +26,7 @@ impl AContrario {
         region.check_frame(width, height)?;
         let part = region.grown(radii.1 + MARGIN, width, height);
         if part == whole {
-            self.find(frame, radii);
+            self.find(frame, radii, first);
             self.show(frame, part);
             return Ok(());
         }
@@ -36,7 +37,7 @@ impl AContrario {
             top,
             ..region
         });
-        self.find(&window, radii);
+        self.find(&window, radii, first);
         self.config.region = Some(region);
         self.window = window;
         self.show(frame, part);

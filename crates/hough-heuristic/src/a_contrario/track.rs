@@ -69,7 +69,7 @@ impl AContrario {
         };
         let window = part.cut(frame, std::mem::take(&mut self.window));
         let region = self.config.region.take();
-        self.find(&window, radii);
+        self.find(&window, radii, radii.0);
         self.config.region = region;
         self.window = window;
         let moved = |measurement: &Measurement| measurement.moved(left.into(), top.into());

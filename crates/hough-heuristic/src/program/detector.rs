@@ -146,7 +146,7 @@ impl Options {
         let default = Acceptance::default();
         let accept = Acceptance {
             theta: self.min_score.unwrap_or(default.theta),
-            min_radius: self.min_radius,
+            min_radius: self.min_radius.unwrap_or(8.0),
             max_radius: self.max_radius.unwrap_or(280.0),
             max_circles: self.max_circles.unwrap_or(32),
             min_distance: self.min_distance.unwrap_or(default.min_distance),

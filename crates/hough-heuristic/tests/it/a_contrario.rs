@@ -178,7 +178,7 @@ fn discs_are_found_of_which_more_than_half_is_hidden_aslant() {
 
 #[test]
 fn frames_of_any_size_pass() {
-    let mut detector = with(|config| config.min_radius = 4.0);
+    let mut detector = with(|config| config.min_radius = Some(4.0));
     for width in (0..30).chain([79, 80, 81, 160, 163]) {
         for height in [0, 1, 2, 3, 11, 12, 13, 24, 80, 161] {
             for (w, h) in [(width, height), (height, width)] {
@@ -231,7 +231,7 @@ proptest! {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let frame = GrayImage::from_fn(width, height, |_, _| Luma([rng.next_u32() as u8 % levels]));
         let mut detector = with(|config| {
-            config.min_radius = 4.0;
+            config.min_radius = Some(4.0);
             config.min_score = 0.0;
         });
         for detection in detector.detect(&frame).unwrap() {
@@ -259,6 +259,7 @@ fn no_pattern_takes_more_than_the_budget() {
     for (name, frame) in patterns(400, 300) {
         for draws_per_megapixel in [1_000, 20_000, 200_000] {
             let mut detector = with(|config| {
+                config.min_radius = Some(8.0);
                 config.max_radius = Some(140.0);
                 config.draws_per_megapixel = draws_per_megapixel;
             });
@@ -288,8 +289,8 @@ fn an_empty_budget_is_refused_and_a_spent_one_is_reported() {
         refused(|config| config.draws_per_megapixel = 0),
         refused(|config| config.milliseconds_per_megapixel = Some(0.0)),
         refused(|config| config.milliseconds_per_megapixel = Some(f64::NAN)),
-        refused(|config| config.min_radius = 3.9),
-        refused(|config| config.min_radius = f64::NAN),
+        refused(|config| config.min_radius = Some(3.9)),
+        refused(|config| config.min_radius = Some(f64::NAN)),
         refused(|config| config.max_circles = 0),
         refused(|config| config.min_score = 1.1),
         refused(|config| config.contrast = 0.0),

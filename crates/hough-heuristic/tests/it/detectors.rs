@@ -16,7 +16,7 @@ pub(crate) fn all(accept: Acceptance) -> Vec<(&'static str, Box<dyn CircleDetect
         .map(|(name, detector)| (name, detector as Box<dyn CircleDetector>))
         .collect();
     let a_contrario = AContrarioConfig {
-        min_radius: accept.min_radius,
+        min_radius: Some(accept.min_radius),
         max_radius: Some(accept.max_radius),
         max_circles: accept.max_circles,
         region: accept.region,

@@ -78,7 +78,7 @@ fn views(frame: &GrayImage) -> Vec<(GrayImage, impl Fn(&Circle) -> Circle)> {
 
 fn detector(min_radius: f64, max_radius: f64) -> AContrario {
     AContrario::new(AContrarioConfig {
-        min_radius,
+        min_radius: Some(min_radius),
         max_radius: Some(max_radius),
         max_circles: 3000,
         ..AContrarioConfig::default()
@@ -358,6 +358,20 @@ fn a_grid_of_discs_is_found_in_the_range_of_its_frame() {
     let mut detector = AContrario::new(AContrarioConfig::default()).unwrap();
     assert_eq!(detector.detect(&frame).unwrap().len(), circles.len());
     assert!(!detector.effort().ended_by_count);
+}
+
+#[test]
+fn small_discs_are_found_without_a_range() {
+    for (count, pitch, radius) in [(24, 15.5, 6.0), (3, 70.0, 5.0), (1, 180.0, 6.0)] {
+        let (frame, circles) = discs(count, pitch, radius);
+        for (turned, place) in views(&frame).iter().step_by(5) {
+            let mut detector = AContrario::new(AContrarioConfig::default()).unwrap();
+            let found = detector.detect(turned).unwrap();
+            assert_eq!(found.len(), circles.len(), "radius {radius}");
+            let is_found = |disc: &Circle| found.iter().any(|one| same(&one.circle, disc, 0.5));
+            assert!(circles.iter().map(place).all(|disc| is_found(&disc)));
+        }
+    }
 }
 
 #[test]
