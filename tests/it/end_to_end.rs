@@ -48,11 +48,11 @@ fn balls_are_gripped_and_the_same_seed_repeats_the_run() {
         }
         (grasped, moves, log)
     };
-    let (grasped, moves, log) = run(4);
-    assert!(grasped >= 3, "only {grasped} of 4 grasped");
-    assert!(moves <= 4 * 25, "{moves} moves for 4 balls");
+    let (grasped, moves, log) = run(3);
+    assert!(grasped >= 2, "only {grasped} of 3 grasped");
+    assert!(moves <= 3 * 25, "{moves} moves for 3 balls");
     assert!(log.iter().any(|(kind, _)| *kind == EventKind::Gripped));
-    assert!(log.starts_with(&run(2).2), "the same seed gave another run");
+    assert!(log.starts_with(&run(1).2), "the same seed gave another run");
 }
 
 #[test]

@@ -262,22 +262,20 @@ impl CircleDetector for Liar {
 
 #[test]
 fn false_circles_never_cause_a_grip() {
-    for seed in 0..2 {
-        let (mut rig, mut agent) = (rig(BEHIND_THE_ARM), agent());
-        let mut between = Between::nothing();
-        between.detector = Box::new(Liar(Xoshiro256PlusPlus::seed_from_u64(seed), Vec::new()));
-        let (end, log) = between.run(&mut rig, &mut agent);
-        let outcome = end.expect("no fault of a device");
-        assert!(
-            outcome.gave_up.is_some() && !rig.holds_ball(),
-            "{outcome:?}"
-        );
-        let config = agent.config();
-        assert!(outcome.cycles <= config.max_cycles + config.recovery.len() + 1);
-        for event in &log.events {
-            if let EventKind::Moved(_) = event.kind {
-                assert!(config.limits.admit(&event.joints), "{}", event.joints);
-            }
+    let (mut rig, mut agent) = (rig(BEHIND_THE_ARM), agent());
+    let mut between = Between::nothing();
+    between.detector = Box::new(Liar(Xoshiro256PlusPlus::seed_from_u64(0), Vec::new()));
+    let (end, log) = between.run(&mut rig, &mut agent);
+    let outcome = end.expect("no fault of a device");
+    assert!(
+        outcome.gave_up.is_some() && !rig.holds_ball(),
+        "{outcome:?}"
+    );
+    let config = agent.config();
+    assert!(outcome.cycles <= config.max_cycles + config.recovery.len() + 1);
+    for event in &log.events {
+        if let EventKind::Moved(_) = event.kind {
+            assert!(config.limits.admit(&event.joints), "{}", event.joints);
         }
     }
 }

