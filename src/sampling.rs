@@ -49,12 +49,21 @@ impl Simulator {
             eye,
             arm,
         };
-        let (mut centering, mut reaching) = (Vec::new(), Vec::new());
-        let mut misses = 0;
+        let (mut centering, mut reaching) = (Vec::<MoveSample>::new(), Vec::<MoveSample>::new());
+        let (mut misses, mut in_a_row) = (0, 0);
         while centering.len() < count || reaching.len() < count {
             let turn_waist = centering.len() < count && centering.len() <= reaching.len();
-            let Some(sample) = sampler.sample(turn_waist, reaching.len() + misses, rng)? else {
+            // Each interval of the elbow has a model of its own, and gets as many samples. One in
+            // which the ball is lost twice has to wait.
+            let mut elbows = ELBOW;
+            elbows.sort_by_key(|&(low, high)| {
+                let inside = |sample: &&MoveSample| (low..high).contains(&sample.jt3_degrees);
+                reaching.iter().filter(inside).count()
+            });
+            let elbow = elbows[in_a_row / 2 % ELBOW.len()];
+            let Some(sample) = sampler.sample(turn_waist, elbow, rng)? else {
                 misses += 1;
+                in_a_row += 1;
                 if misses > 50 + centering.len() + reaching.len() {
                     return Err(unseen(
                         "the ball is lost again and again; check the light on it",
@@ -62,6 +71,7 @@ impl Simulator {
                 }
                 continue;
             };
+            in_a_row = 0;
             let flow = on_progress(&sample);
             if turn_waist {
                 centering.push(sample);
@@ -129,12 +139,10 @@ impl Sampler<'_> {
     fn sample<R: Rng + ?Sized>(
         &mut self,
         turn_waist: bool,
-        number: usize,
+        elbow: (f64, f64),
         rng: &mut R,
     ) -> Result<Option<MoveSample>, AgentError> {
-        // Each interval of the elbow has a model of its own, and gets as many samples.
-        let elbow = ELBOW[number % ELBOW.len()];
-        // So does each distance, of which the starts of learning are drawn.
+        // Each distance gets as many samples, too: the starts of learning are drawn from them.
         let r = rng.random_range(FARTHEST.ln()..NEAREST.ln()).exp();
         let plan = self.plan(turn_waist, elbow, (0.9 * r, r / 0.9), rng);
         let plan = plan.or_else(|| self.plan(turn_waist, elbow, (0.0, NEAREST), rng));

@@ -124,7 +124,7 @@ fn the_papers_whole_way_is_gone_on_the_arm_itself() {
     grasp.args([
         "--teach-goal",
         "--sample",
-        "20",
+        "27",
         "--simulator",
         "rigid8",
         "--keep-learning",
