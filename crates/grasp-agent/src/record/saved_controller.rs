@@ -3,6 +3,7 @@
 use crate::controller::{Controller, SavedController};
 use crate::controllers::hybrid::belief::Belief;
 use crate::controllers::hybrid::controller::Hybrid;
+use crate::controllers::hybrid::evidence::Evidence;
 use crate::controllers::hybrid::settings::HybridSettings;
 use crate::controllers::learned::{Learned, OnlineLearning};
 use crate::controllers::servo::controller::{Servo, ServoLaw};
@@ -12,6 +13,8 @@ use crate::error::BehaviourError;
 
 /// Data of a learned controller: behaviours, learning at work with its draws, and a taught goal.
 type LearnedData = (Learned, Option<(OnlineLearning, u64)>, Option<TaughtGoal>);
+/// Data of a hybrid: settings, belief, marks, the run before and the number of runs that fitted.
+type HybridData = (HybridSettings, Belief, [bool; 2], (Evidence, usize));
 
 impl SavedController {
     /// Makes the controller again; a hybrid comes back frozen, as it decides within a run by what
@@ -39,10 +42,11 @@ impl SavedController {
                 Ok(Box::new(Servo::new(law, settings)))
             }
             "hybrid" => {
-                let (settings, belief, marks): (HybridSettings, Belief, [bool; 2]) = self.data()?;
+                let (settings, belief, marks, before): HybridData = self.data()?;
                 settings.check()?;
                 belief.check()?;
-                Ok(Box::new(Hybrid::restored(settings, belief, marks)))
+                before.0.check()?;
+                Ok(Box::new(Hybrid::restored(settings, belief, marks, before)))
             }
             kind => Err(BehaviourError::Text {
                 what: format!("{kind:?} is not a kind of controller of this crate"),

@@ -152,7 +152,7 @@ impl SavedRun {
     }
 }
 
-const FORMAT: &str = "grasp-agent run 5";
+const FORMAT: &str = "grasp-agent run 6";
 
 #[derive(Debug, Deserialize)]
 struct Head {

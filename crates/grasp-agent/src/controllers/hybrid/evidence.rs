@@ -2,11 +2,13 @@
 
 use hough_heuristic::Features;
 use puma_val2::Joints;
+use serde::{Deserialize, Serialize};
 
 use crate::controllers::hybrid::parameters::{Numbers, at};
+use crate::error::BehaviourError;
 
 /// Path of the arm in one run, and the sightings of a ball at rest.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Evidence {
     /// Reported joint angles, radians, in order.
     path: Vec<Joints>,
@@ -23,6 +25,23 @@ pub(crate) struct Stands {
 }
 
 impl Evidence {
+    /// Checks what was read: sightings at places of the path, and numbers that are finite.
+    pub(crate) fn check(&self) -> Result<(), BehaviourError> {
+        let inside = |at: usize| at < self.path.len();
+        let placed = self.sightings.iter().all(|(at, _)| inside(*at))
+            && self
+                .held
+                .is_none_or(|(at, unsure)| inside(at) && unsure > 0.0);
+        let angles = self.path.iter().flat_map(|joints| joints.0);
+        let seen = self.sightings.iter().flat_map(|(_, f)| [f.x, f.y, f.r]);
+        if placed && angles.chain(seen).all(f64::is_finite) {
+            return Ok(());
+        }
+        Err(BehaviourError::Text {
+            what: "the sightings of the run before are damaged".into(),
+        })
+    }
+
     /// Creates the evidence of a ball that shows as `seen` from a pose and is between the jaws, up
     /// to `unsure` metres, after the move to another.
     pub(crate) fn shown(seen: Features, [from, gripping]: [Joints; 2], unsure: f64) -> Self {
@@ -76,6 +95,45 @@ impl Evidence {
     pub(crate) fn forget_sightings(&mut self) {
         self.sightings.clear();
         self.held = None;
+    }
+
+    /// Returns the evidence with those sightings, from a pose, that `keep` chooses.
+    pub(crate) fn with_sightings(&self, mut keep: impl FnMut(&Joints, &Features) -> bool) -> Self {
+        let mut evidence = self.clone();
+        let path = &self.path;
+        evidence
+            .sightings
+            .retain(|(at, seen)| keep(&path[*at], seen));
+        evidence
+    }
+
+    /// Returns the evidence with the first of the sightings that repeat one another.
+    pub(crate) fn thinned(&self) -> Self {
+        /// Least turn of a joint between two poses, radians, or distance in the image, units.
+        const APART: (f64, f64) = (0.001, 5.0);
+        const MOST: usize = 32;
+        let mut last: Option<(Joints, Features)> = None;
+        let mut left = MOST;
+        self.with_sightings(|pose, seen| {
+            let apart = |(stood, before): (Joints, Features)| {
+                (0..3).any(|i| (stood.0[i] - pose.0[i]).abs() > APART.0)
+                    || (before.x - seen.x).hypot(before.y - seen.y) > APART.1
+            };
+            let keep = left > 0 && last.is_none_or(apart);
+            if keep {
+                (last, left) = (Some((*pose, *seen)), left - 1);
+            }
+            keep
+        })
+    }
+
+    /// Returns the evidence with a path on which `JT2` turns `JT3` by this share.
+    pub(crate) fn dragged(&self, share: f64) -> Self {
+        let mut evidence = self.clone();
+        for pose in &mut evidence.path {
+            pose.0[2] += share * (pose.0[1] - MIDDLE[0]);
+        }
+        evidence
     }
 
     /// Returns the evidence with other features in the sightings.

@@ -158,29 +158,22 @@ impl Fit {
         self
     }
 
-    /// Returns the share of the sightings in `evidence`, the only one of this fit, that lie far
-    /// from the expected place; `None` if the others do not fit, by their mean squared distance.
-    pub(crate) fn outliers(
+    /// Returns `evidence`, the only one of this fit, with the sightings that lie within so many
+    /// feature units of their expected place; `None` if no ball was seen.
+    pub(crate) fn within(
         &self,
         nominal: &CameraModel,
         evidence: &Evidence,
-        fits: f64,
-    ) -> Option<f64> {
-        /// Distance in the image, feature units.
-        const FAR: f64 = 10.0;
+        far: f64,
+    ) -> Option<Evidence> {
         let ball = (*self.balls.first()?)?;
-        let (model, stands) = (
-            corrected(nominal, &self.numbers),
-            evidence.stands(&self.numbers),
-        );
-        let distances = stands.views.iter().map(|(joints, f)| {
+        let model = corrected(nominal, &self.numbers);
+        let stands = evidence.stands(&self.numbers);
+        let mut near = stands.views.iter().map(|(joints, f)| {
             let expected = seen(&model, &model.arm.wrist(joints), &ball);
-            expected.map_or(f64::INFINITY, |expected| (expected - vector(f)).norm())
+            expected.is_some_and(|expected| (expected - vector(f)).norm() < far)
         });
-        let near: Vec<f64> = distances.filter(|distance| *distance < FAR).collect();
-        let squares: f64 = near.iter().map(|distance| distance * distance).sum();
-        let share = 1.0 - near.len() as f64 / stands.views.len().max(1) as f64;
-        (squares < 3.0 * fits * near.len() as f64).then_some(share)
+        Some(evidence.with_sightings(|_, _| near.next().unwrap_or_default()))
     }
 
     /// Returns the standard deviation of the residuals; `None` if there are too few.

@@ -44,41 +44,47 @@ impl std::fmt::Display for Misfit {
 
 /// Least number of sightings that are judged.
 pub(crate) const ENOUGH: usize = 8;
-/// Mean squared residual of a model that fits, feature units squared: twice the noise of a poor
-/// camera.
-const FITS: f64 = 9.0;
+/// Cost of a sighting whose residuals are as large as those of a poor camera, feature units
+/// squared.
+const FITS: f64 = 12.0;
+/// Least number of different sightings that are judged, and the least cost that a cause saves.
+const TELLS: (usize, f64) = (3, 30.0);
 /// Largest cost of the right cause, as a share of the cost without it.
-const EXPLAINED: f64 = 0.5;
-/// Share below which it leaves no doubt.
-const CLEAR: f64 = 0.2;
-/// Largest share of sightings that can be outliers.
-const FEW: f64 = 0.4;
-/// Step of the dead zones that are tried, radians, and their number.
-const DEAD_ZONES: (f64, usize) = (0.0045, 8);
+const EXPLAINED: f64 = 0.6;
+/// Cost of a sighting that is taken for an outlier, feature units squared, and the largest share of
+/// such sightings.
+const OUTLYING: (f64, f64) = (30.0, 0.6);
+/// Least share of the sightings of which a lag says the pose.
+const WHOLE: f64 = 0.5;
+/// Dead zones that are tried, radians: the first, and the ratio of one to the next.
+const DEAD_ZONES: (f64, f64, i32) = (0.005, 1.2, 11);
+/// Turns of `JT3` per turn of `JT2` that are tried.
+const DRAGS: [f64; 4] = [-0.3, -0.12, 0.12, 0.3];
 
 /// Returns the cause of the residuals of one run, in which a ball at rest was seen; `None` if they
-/// are as large as expected.
+/// are as large as expected. `calm` says that the runs before did fit.
 pub(crate) fn misfit(
-    record: &Evidence,
+    [recent, record]: [&Evidence; 2],
     belief: &Belief,
     prior: &Prior,
     nominal: &CameraModel,
+    calm: bool,
 ) -> Option<Misfit> {
-    if record.len() < ENOUGH {
-        return None;
-    }
     let fresh = belief.fresh(prior);
-    let fit = |record: &Evidence| Fit::of(&fresh, &fresh.numbers(), nominal, &[record]);
-    // Mean cost of a residual: squared feature units, up to the outliers.
-    let cost = |record: &Evidence| {
-        let fit = fit(record).filter(|_| record.len() >= ENOUGH)?;
-        Some(fit.cost / (3 * record.len()) as f64)
+    let pair = |other: &dyn Fn(&Evidence) -> Evidence| [other(recent), other(record)];
+    // Mean cost of a sighting: squared feature units, up to the outliers.
+    let cost = |records: &[Evidence; 2]| {
+        let records = [records[0].thinned(), records[1].thinned()];
+        let number = records[0].len() + records[1].len();
+        let seen: Vec<_> = records.iter().filter(|r| r.len() > 0).collect();
+        let fit = Fit::of(&fresh, &fresh.numbers(), nominal, &seen)?;
+        (number >= TELLS.0).then(|| fit.cost / number as f64)
     };
-    let plain = cost(record).unwrap_or(f64::INFINITY);
-    let learned = Fit::of(belief, &belief.numbers(), nominal, &[record]);
+    let plain = cost(&pair(&Evidence::clone))?;
     if plain < FITS {
-        let by_learned = learned?.cost * belief.noise().powi(2) / (3 * record.len()) as f64;
-        return (by_learned > 2.0 * FITS).then_some(Misfit::CameraSlipped);
+        let learned = Fit::of(belief, &belief.numbers(), nominal, &[&record.thinned()])?;
+        let by_learned = learned.cost * belief.noise().powi(2) / record.thinned().len() as f64;
+        return (calm && by_learned > 2.0 * FITS).then_some(Misfit::CameraSlipped);
     }
     let (w, h) = (Features::WIDTH, Features::HEIGHT);
     // Rows of the matrices by which x and y are turned.
@@ -94,21 +100,77 @@ pub(crate) fn misfit(
             let (x, y) = (xx * x + xy * y, yx * x + yy * y);
             Features::new(x + 0.5 * w, y + 0.5 * h, f.r)
         };
-        (Misfit::TurnedImage, record.seen_as(turned))
+        (Misfit::TurnedImage, pair(&|record| record.seen_as(turned)))
     });
-    let late = [1, 2, 3].map(|poses| (Misfit::LateImages, record.late(poses)));
-    let zones = (1..=DEAD_ZONES.1).map(|i| DEAD_ZONES.0 * i as f64);
-    let dead = zones.map(|zone| (Misfit::DeadZone, record.sticking(zone)));
-    let causes = turned.into_iter().chain(late).chain(dead);
-    let costs = causes.filter_map(|(cause, record)| Some((cause, cost(&record)?)));
-    let best = costs.min_by(|a, b| a.1.total_cmp(&b.1));
-    let (cause, least) = best.unwrap_or((Misfit::Unexplained, plain));
-    let fits = fit(record).into_iter().chain(learned);
-    let mut outliers = fits.filter_map(|fit| fit.outliers(nominal, record, FITS));
-    Some(match least / plain {
-        share if share < CLEAR => cause,
-        _ if outliers.any(|share| share < FEW) => Misfit::Outliers,
-        share if share < EXPLAINED => cause,
-        _ => Misfit::Unexplained,
-    })
+    let late = [1, 2, 3].map(|poses| (Misfit::LateImages, pair(&|record| record.late(poses))));
+    let (least, ratio, number) = DEAD_ZONES;
+    let zones = (0..number).map(|i| least * ratio.powi(i));
+    let dead = zones.map(|zone| (Misfit::DeadZone, pair(&|record| record.sticking(zone))));
+    let dragged = DRAGS.map(|share| (Misfit::Arm, pair(&|record| record.dragged(share))));
+    let plainly = std::iter::once((Misfit::Outliers, pair(&Evidence::clone)));
+    let causes = turned.into_iter().chain(late).chain(dead).chain(dragged);
+    let number = record.len() as f64;
+    let mut best: Option<(Misfit, f64)> = None;
+    let mut of_cause: Vec<(Misfit, f64, [Evidence; 2])> = Vec::new();
+    for (cause, record) in causes.chain(plainly) {
+        let most = record[1].len() as f64;
+        let cost = match cause {
+            Misfit::Outliers => Some(plain),
+            // A lag leaves sightings after one that is missing out.
+            Misfit::LateImages if most < WHOLE * number => None,
+            _ => cost(&record),
+        };
+        let Some(cost) = cost else { continue };
+        match of_cause.iter_mut().find(|other| other.0 == cause) {
+            Some(other) if other.1 <= cost => {}
+            Some(other) => *other = (cause, cost, record),
+            None => of_cause.push((cause, cost, record)),
+        }
+    }
+    for (cause, cost, record) in of_cause {
+        let least =
+            without_outliers(&record[1].thinned(), &fresh, nominal).unwrap_or(f64::INFINITY);
+        let least = if cause == Misfit::Outliers {
+            least
+        } else {
+            least.min(cost)
+        };
+        if best.is_none_or(|(_, other)| least < other) {
+            best = Some((cause, least));
+        }
+    }
+    let tells = |cost: f64| cost < EXPLAINED * plain && (plain - cost) * number > TELLS.1;
+    let explained = best.filter(|(_, cost)| tells(*cost));
+    Some(explained.map_or(Misfit::Unexplained, |(cause, _)| cause))
+}
+
+/// Returns the mean cost of a sighting if the sightings that lie far from their expected place are
+/// outliers; `None` if too many do. A few successive sightings, tried at several places, show where
+/// the others are expected.
+fn without_outliers(record: &Evidence, fresh: &Belief, nominal: &CameraModel) -> Option<f64> {
+    /// Distances in the image beyond which a sighting is left out, feature units, in order.
+    const FAR: [f64; 3] = [20.0, 10.0, 10.0];
+    const TRIES: usize = 8;
+    const FEW: usize = 3;
+    let (cost, share) = OUTLYING;
+    let fit = |kept: &Evidence| Fit::of(fresh, &fresh.numbers(), nominal, &[kept]);
+    let within = |kept: &Evidence, far| fit(kept)?.within(nominal, record, far);
+    let number = record.len();
+    let tries = (0..TRIES).filter_map(|i| {
+        let first = i * number.saturating_sub(FEW) / (TRIES - 1);
+        let mut index = 0;
+        let few = record.with_sightings(|_, _| {
+            index += 1;
+            (first + 1..first + 1 + FEW).contains(&index)
+        });
+        within(&few, 2.0 * FAR[0])
+    });
+    let mut kept = tries.max_by_key(Evidence::len)?;
+    for far in FAR {
+        kept = within(&kept, far)?;
+    }
+    let left = number - kept.len();
+    let total = fit(&kept)?.cost + cost * left as f64;
+    let few = left as f64 <= share * number as f64;
+    (few && left > 0 && kept.len() > FEW).then(|| total / number as f64)
 }

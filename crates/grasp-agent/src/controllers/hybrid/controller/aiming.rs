@@ -8,6 +8,9 @@ use crate::controllers::hybrid::controller::Hybrid;
 use crate::controllers::hybrid::parameters::{Numbers, deviations, sensitivity};
 use crate::percept::Sighting;
 
+/// Standard deviation of an aim, metres, with which it does not miss the ball by chance.
+const SURE: f64 = 0.003;
+
 impl Hybrid {
     /// Returns the move that brings the jaws to the ball; `None` if it is too uncertain.
     pub(super) fn aim(&mut self, ball: &Sighting, request: &Request) -> Option<JointDelta> {
@@ -39,6 +42,9 @@ impl Hybrid {
         };
         let (_, by_all) = sensitivity(&estimate.numbers, &estimate.ball, miss)?;
         let uncertainty = deviations(&by_all, &estimate.covariance).norm();
+        if self.run.misses == 0 {
+            self.run.sure = uncertainty < SURE;
+        }
         let motors = match displaced(
             &(by_all * estimate.covariance * by_all.transpose()),
             self.run.misses,

@@ -9,6 +9,8 @@ use crate::controllers::hybrid::misfit::{ENOUGH, Misfit, misfit};
 /// Slip of the camera in two runs: least number of sightings in each, least cost that a new mount
 /// saves, and largest cost of a residual after it.
 const SLIP_SHOWS: (usize, f64, f64) = (3, 80.0, 3.0);
+/// Number of runs in order without a misfit, after which another one can show a slip.
+const CALM: usize = 3;
 /// Number of own aims that may miss in one run before the arm is in doubt.
 const OFTEN: usize = 3;
 
@@ -26,14 +28,18 @@ impl Hybrid {
         }
     }
 
-    /// Looks for the cause of residuals that are too large, now and then.
+    /// Looks for the cause of residuals that are too large: each time that the sightings have
+    /// doubled.
     pub(super) fn judge(&mut self) {
         let (record, settings) = (&self.run.record, &self.settings);
-        if record.len().is_multiple_of(ENOUGH) {
-            let cause = misfit(record, &self.belief, &settings.prior, &settings.nominal);
-            let aims_fail = self.run.misses > OFTEN;
-            let cause = cause.or(aims_fail.then_some(Misfit::Arm));
+        if record.len() >= ENOUGH && record.len().is_power_of_two() {
+            let calm = self.calm >= CALM;
+            let (prior, nominal) = (&settings.prior, &settings.nominal);
+            let cause = misfit([&self.recent, record], &self.belief, prior, nominal, calm);
             self.run.misfit = cause.or(self.run.misfit);
+        }
+        if self.run.misses > OFTEN && self.run.sure {
+            self.run.misfit = self.run.misfit.or(Some(Misfit::Arm));
         }
     }
 
@@ -57,7 +63,9 @@ impl Hybrid {
     /// Learns from the run that is over.
     pub(super) fn learn(&mut self) {
         self.remember();
-        self.slipped = self.learning && self.has_slipped();
+        self.slipped = self.learning && self.calm >= CALM && self.has_slipped();
+        let fits = matches!(self.run.misfit, None | Some(Misfit::CameraSlipped));
+        self.calm = if fits { self.calm + 1 } else { 0 };
         let record = std::mem::take(&mut self.run.record);
         let recent = std::mem::replace(&mut self.recent, record.clone());
         if self.slipped {

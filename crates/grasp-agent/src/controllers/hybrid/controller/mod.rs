@@ -39,6 +39,8 @@ pub struct Hybrid {
     recent: Evidence,
     /// `true` if the last run has shown that the camera had slipped.
     slipped: bool,
+    /// Number of latest runs, in order, that the model fitted.
+    calm: usize,
     /// Set while a remembered run is not yet part of the belief.
     news: bool,
     learning: bool,
@@ -73,6 +75,8 @@ struct Run {
     missed: bool,
     /// Own aims that have missed.
     misses: usize,
+    /// `true` if the first one was certain.
+    sure: bool,
 }
 
 impl Default for Run {
@@ -91,6 +95,7 @@ impl Default for Run {
             aimed: false,
             missed: false,
             misses: 0,
+            sure: false,
         }
     }
 }
@@ -148,6 +153,7 @@ impl Hybrid {
             remembered: Vec::new(),
             recent: Evidence::default(),
             slipped: false,
+            calm: 0,
             news: false,
             learning: true,
             shown: false,
@@ -156,13 +162,20 @@ impl Hybrid {
     }
 
     /// Creates a controller that decides by a belief as it is, and learns nothing. The marks say
-    /// that a goal was taught, and that the camera has slipped.
-    pub(crate) fn restored(settings: HybridSettings, belief: Belief, marks: [bool; 2]) -> Self {
-        let [shown, slipped] = marks;
+    /// that a goal was taught, and that the camera has slipped; the rest is the run before and the
+    /// number of runs that fitted.
+    pub(crate) fn restored(
+        settings: HybridSettings,
+        belief: Belief,
+        [shown, slipped]: [bool; 2],
+        (recent, calm): (Evidence, usize),
+    ) -> Self {
         Self {
             learning: false,
             shown,
             slipped,
+            recent,
+            calm,
             ..Self::beginning(settings, belief)
         }
     }
@@ -427,7 +440,8 @@ impl Controller for Hybrid {
 
     fn save(&self) -> Option<SavedController> {
         let marks = [self.shown, self.slipped];
-        SavedController::new("hybrid", (self.settings, &self.belief, marks))
+        let before = (&self.recent, self.calm);
+        SavedController::new("hybrid", (self.settings, &self.belief, marks, before))
     }
 }
 
