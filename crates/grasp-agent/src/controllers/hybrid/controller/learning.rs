@@ -5,6 +5,7 @@ use crate::controllers::hybrid::controller::{HELD, Hybrid};
 use crate::controllers::hybrid::evidence::Evidence;
 use crate::controllers::hybrid::fit::Fit;
 use crate::controllers::hybrid::misfit::{ENOUGH, Misfit, misfit};
+use crate::controllers::hybrid::settings::HybridSettings;
 
 /// Slip of the camera in two runs: least number of sightings in each, least cost that a new mount
 /// saves, and largest cost of a residual after it.
@@ -15,6 +16,25 @@ const CALM: usize = 3;
 const OFTEN: usize = 3;
 
 impl Hybrid {
+    /// Creates a controller that decides by a belief as it is, and learns nothing. The marks say
+    /// that a goal was taught, and that the camera has slipped; the rest is the run before and the
+    /// number of runs that fitted.
+    pub(crate) fn restored(
+        settings: HybridSettings,
+        belief: Belief,
+        [shown, slipped]: [bool; 2],
+        (recent, calm): (Evidence, usize),
+    ) -> Self {
+        Self {
+            learning: false,
+            shown,
+            slipped,
+            recent,
+            calm,
+            ..Self::beginning(settings, belief)
+        }
+    }
+
     /// Keeps the sightings of one ball in one place as evidence for later runs.
     pub(super) fn remember(&mut self) {
         // A single sighting determines the ball's place and nothing of the camera.

@@ -161,25 +161,6 @@ impl Hybrid {
         }
     }
 
-    /// Creates a controller that decides by a belief as it is, and learns nothing. The marks say
-    /// that a goal was taught, and that the camera has slipped; the rest is the run before and the
-    /// number of runs that fitted.
-    pub(crate) fn restored(
-        settings: HybridSettings,
-        belief: Belief,
-        [shown, slipped]: [bool; 2],
-        (recent, calm): (Evidence, usize),
-    ) -> Self {
-        Self {
-            learning: false,
-            shown,
-            slipped,
-            recent,
-            calm,
-            ..Self::beginning(settings, belief)
-        }
-    }
-
     /// Sets a goal that was taught on the arm. The taught grip also calibrates the camera, since
     /// the ball was between the jaws. From then on the errors of the arm are learned too: without a
     /// grip, sightings hardly tell them from errors of the camera.
