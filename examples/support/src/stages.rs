@@ -19,8 +19,8 @@ pub fn cpu_time() -> Duration {
     }
     #[cfg(not(unix))]
     {
-        static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-        BEGIN.get_or_init(std::time::Instant::now).elapsed()
+        static BEGIN: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
+        BEGIN.get_or_init(Instant::now).elapsed()
     }
 }
 
