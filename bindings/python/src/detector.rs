@@ -35,7 +35,7 @@ impl Detector {
     #[pyo3(signature = (
         *, min_radius=None, max_radius=None, max_circles=None, rings="all", min_distance=0.0,
         min_axis_ratio=1.0, min_score=0.5, contrast=8.0, draws=50_000, time_limit=None,
-        region=None, channel="luma", seed=1
+        region=None, channel="auto", seed=1
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn new(

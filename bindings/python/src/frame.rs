@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 /// Parses the name of a channel.
 pub fn channel(name: &str) -> PyResult<Channel> {
     Ok(match name {
+        "auto" => Channel::Auto,
         "luma" => Channel::Luma,
         "red" => Channel::Red,
         "green" => Channel::Green,
@@ -17,7 +18,8 @@ pub fn channel(name: &str) -> PyResult<Channel> {
         "strongest" => Channel::Strongest,
         _ => {
             return Err(PyValueError::new_err(format!(
-                "channel is {name:?}: use \"luma\", \"red\", \"green\", \"blue\" or \"strongest\""
+                "channel is {name:?}: use \"auto\", \"luma\", \"red\", \"green\", \"blue\" or \
+                 \"strongest\""
             )));
         }
     })

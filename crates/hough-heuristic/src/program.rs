@@ -65,7 +65,7 @@ struct Options {
     region: Option<Region>,
 
     /// Part of coloured pictures that is searched
-    #[arg(long, value_enum, default_value_t = Channel::Luma)]
+    #[arg(long, value_enum, default_value_t = Channel::Auto)]
     channel: Channel,
 
     /// Circles reported of those about one centre [default: all; a-contrario only]

@@ -20,7 +20,7 @@ class Detector:
         draws: int = 50_000,
         time_limit: Optional[float] = None,
         region: Optional[tuple[int, int, int, int]] = None,
-        channel: str = "luma",
+        channel: str = "auto",
         seed: int = 1,
     ) -> None: ...
     def detect(self, image: NDArray[Any]) -> NDArray[np.float64]: ...

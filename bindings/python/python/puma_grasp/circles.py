@@ -93,8 +93,9 @@ class Detector:
         Time limit in milliseconds per million pixels. With one, results depend on the machine.
     region : tuple of int, optional
         Left, top, width and height of the region in which the centres must lie.
-    channel : {"luma", "red", "green", "blue", "strongest"}
-        Part of a coloured picture that is searched. Colours are in the order red, green, blue:
+    channel : {"auto", "luma", "red", "green", "blue", "strongest"}
+        Part of a coloured picture that is searched: ``"auto"`` takes brightness unless a component
+        shows much stronger edges. Colours are in the order red, green, blue:
         for a picture read by OpenCV pass ``image[..., ::-1]``.
     seed : int
         Seed of the draws.

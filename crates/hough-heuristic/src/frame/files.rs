@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use image::metadata::Orientation;
-use image::{DynamicImage, GrayImage, ImageDecoder, ImageReader, Luma};
+use image::{DynamicImage, GrayImage, ImageDecoder, ImageReader};
 
 use crate::frame::{FrameError, FrameSource};
 
@@ -19,8 +19,12 @@ const ENDINGS: &[&str] = if cfg!(feature = "tiff") {
 #[cfg_attr(feature = "program", derive(clap::ValueEnum))]
 #[non_exhaustive]
 pub enum Channel {
-    /// Brightness as the eye sees it.
+    /// Brightness, unless one of the three components shows edges at least 1.5 times as strong (in
+    /// gray levels squared, see [`Strongest`](Self::Strongest)): red on green of like brightness.
+    /// Chosen for each picture.
     #[default]
+    Auto,
+    /// Brightness as the eye sees it.
     Luma,
     /// The red component.
     Red,
@@ -28,7 +32,8 @@ pub enum Channel {
     Green,
     /// The blue component.
     Blue,
-    /// The one of the three components that changes most over 4 pixels, in the mean square.
+    /// The one of the three components with the strongest edges: that which changes most over 4
+    /// pixels, in the root of the mean fourth power. So texture hides no few strong edges.
     Strongest,
 }
 
@@ -42,32 +47,27 @@ impl Channel {
 
     /// Takes this part of a picture of 8 bits, or of one that uses all of 16.
     pub(crate) fn gray(self, picture: DynamicImage) -> GrayImage {
-        let component = match self {
-            Self::Red => 0,
-            Self::Green => 1,
-            Self::Blue => 2,
-            _ => 3,
-        };
         if !picture.color().has_color() || self == Self::Luma {
             return picture.into_luma8();
         }
+        let luma = (self == Self::Auto).then(|| picture.to_luma8());
         let picture = picture.into_rgb8();
-        let of = |component: usize| {
-            let (width, height) = picture.dimensions();
-            GrayImage::from_fn(width, height, |x, y| {
-                Luma([picture.get_pixel(x, y).0[component]])
-            })
+        let component = |component: usize| {
+            let values = picture.iter().skip(component).step_by(3).copied();
+            GrayImage::from_vec(picture.width(), picture.height(), values.collect())
+                .unwrap_or_default()
         };
-        if component < 3 {
-            return of(component);
-        }
-        let mut strongest = of(0);
-        for other in [of(1), of(2)] {
-            if change(&other) > change(&strongest) {
-                strongest = other;
+        let strongest = || [2, 1, 0].map(component).into_iter().max_by_key(edges);
+        match (self, luma) {
+            (Self::Red, _) => component(0),
+            (Self::Green, _) => component(1),
+            (Self::Blue, _) => component(2),
+            (_, None) => strongest().unwrap_or_default(),
+            (_, Some(luma)) => {
+                let clear = |plane: &GrayImage| edges(plane) > edges(&luma) / 4 * 9;
+                strongest().filter(clear).unwrap_or(luma)
             }
         }
-        strongest
     }
 }
 
@@ -110,7 +110,7 @@ impl ImageFiles {
         Self {
             paths: paths.into_iter().collect(),
             next: 0,
-            channel: Channel::Luma,
+            channel: Channel::default(),
             depth: None,
         }
     }
@@ -149,7 +149,7 @@ impl ImageFiles {
         Ok(Self::new(paths))
     }
 
-    /// Sets the channel of coloured pictures (default [`Channel::Luma`]).
+    /// Sets the channel of coloured pictures (default [`Channel::Auto`]).
     #[must_use]
     pub fn with_channel(mut self, channel: Channel) -> Self {
         self.channel = channel;
@@ -222,16 +222,15 @@ fn stretch(picture: &mut DynamicImage) -> Option<u32> {
     (bits < u16::BITS).then_some(bits)
 }
 
-/// The sum of the squared differences between pixels 4 px apart.
-fn change(gray: &GrayImage) -> u64 {
-    let square = |a: u8, b: u8| u64::from(a.abs_diff(b)).pow(2);
-    let pairs = |apart: usize, line: &[u8]| -> u64 {
-        let ends = line.iter().skip(apart);
-        line.iter().zip(ends).map(|(&a, &b)| square(a, b)).sum()
+/// The sum of the fourth powers of the differences between pixels 4 px apart.
+fn edges(plane: &GrayImage) -> u64 {
+    let sum = |ends: &mut dyn Iterator<Item = (&u8, &u8)>| -> u64 {
+        ends.map(|(a, b)| u64::from(a.abs_diff(*b)).pow(4)).sum()
     };
-    let width = gray.width() as usize;
-    let rows = gray.as_raw().chunks_exact(width.max(1));
-    rows.map(|row| pairs(4, row)).sum::<u64>() + pairs(4 * width, gray.as_raw())
+    let (width, levels) = (plane.width() as usize, plane.as_raw());
+    let rows = levels.chunks_exact(width.max(1));
+    let along = rows.map(|row| sum(&mut row.iter().zip(row.iter().skip(4))));
+    along.sum::<u64>() + sum(&mut levels.iter().zip(levels.iter().skip(4 * width)))
 }
 
 fn is_image(path: &Path) -> bool {
@@ -244,7 +243,7 @@ fn is_image(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::ImageBuffer;
+    use image::{ImageBuffer, Luma};
 
     #[test]
     fn a_folder_is_read_in_order_and_past_a_broken_file() {
@@ -338,6 +337,25 @@ mod tests {
         );
         let red = levels(&picture, Channel::Red);
         assert_eq!(levels(&picture, Channel::Strongest), red);
+        assert_eq!(levels(&picture, Channel::Auto), red);
+        // Texture of all three changes more in the mean square, but has no strong edges.
+        let textured = |edge: u8| {
+            let level = |x: u32, y: u32| (x * x * 7 + y * y * 13 + x * y) % 60;
+            let picture = image::RgbImage::from_fn(80, 60, |x, y| {
+                let (red, green) = if x > 40 { (edge, 60) } else { (60, 100) };
+                let noise = level(x, y) as u8;
+                image::Rgb([red + noise, green + noise, 90 + noise])
+            });
+            DynamicImage::ImageRgb8(picture)
+        };
+        for (edge, chosen) in [(195, Channel::Red), (80, Channel::Luma)] {
+            let picture = textured(edge);
+            assert_eq!(
+                levels(&picture, Channel::Auto),
+                levels(&picture, chosen),
+                "{edge}"
+            );
+        }
     }
 
     #[test]
