@@ -13,6 +13,7 @@ mod ellipses;
 mod fit;
 mod halve;
 mod level;
+mod listed;
 mod measure;
 mod measurement;
 mod part;
@@ -38,20 +39,19 @@ pub use config::AContrarioConfig;
 pub use measurement::{Effort, MeasuredEllipse, Measurement};
 pub use rings::Rings;
 
-use crate::clock;
 use crate::detect::{CircleDetector, Detection, FrameRefused};
-use crate::edges::{Maxima, ROW_STEP, Vectorized, noise_deviation, widest};
+use crate::edges::{ROW_STEP, Vectorized, noise_deviation, widest};
 use crate::error::ConfigError;
 use budget::{Budget, Stage};
 use candidate::Collected;
 use chance::log10;
 use directions::UnitCircle;
 use level::Level;
+use listed::Edges;
 use polar::{Polar, Ring};
 use proof::Proof;
 use prover::{Prover, Pyramid, Size};
 use search::{Outline, Search};
-use thin::Thinning;
 
 /// An *a contrario* detector: finds an unknown number of circles, each with the number of false
 /// alarms that bounds its chance origin, and with the standard errors of its measurement.
@@ -278,44 +278,15 @@ impl AContrario {
         let deadline = self.budget.deadline;
         let mirror_slack = if noise > 12.0 { 0.35 } else { 0.28 };
         let edges_of = |depth: usize, edges: &mut Edges, asks: bool| {
-            let Edges {
-                maxima,
-                thinning,
-                level,
-                late,
-                small,
-            } = edges;
-            let gray = pyramid.gray(depth);
             let noise = noise / (1 << depth) as f32 + ROUNDING;
-            let threshold = (STEP_GAIN * contrast).max(NOISE_FACTOR * noise * maxima.noise_gain());
-            let begun = clock::now();
-            let points = maxima.find(gray.pixels, gray.width, threshold, deadline);
-            // Listing them takes the longer, the more of the pixels are among them.
-            let share = points.len() as f64 / gray.pixels.len().max(1) as f64;
-            let spent = clock::between(begun, clock::now()).mul_f64(LISTING.0 + LISTING.1 * share);
-            let is_late = clock::is_past(deadline.and_then(|time| time.checked_sub(spent)));
-            *late |= is_late;
-            if is_late {
-                level.fill(0, 0, &[]);
-                return;
-            }
-            if asks {
-                // Small outlines are dense: all of their points are needed.
-                level.fill(gray.width, gray.height, points);
-                *small = search::shows_small(&self.outline, level, mirror_slack);
-            }
-            let points = thinning.strongest(points, (gray.width, gray.height));
-            level.fill(gray.width, gray.height, points);
+            let least = NOISE_FACTOR * noise * edges.maxima.noise_gain();
+            let threshold = (STEP_GAIN * contrast).max(least);
+            let asked = asks.then_some((&self.outline, mirror_slack));
+            edges.find(pyramid.gray(depth), threshold, deadline, asked);
         };
         let mut search =
-            |depth, level: &mut Level, radii: (f64, f64), budget: &mut Budget, last| {
+            |depth, edges: &mut Edges, radii: (f64, f64), budget: &mut Budget, last| {
                 let scale = (1 << depth) as f32;
-                budget.begin_size(last);
-                for proof in prover.proofs.iter().filter(|proof| proof.is_beyond_doubt()) {
-                    let ring = proof.in_frame().shrunk(scale);
-                    self.outline
-                        .explain(&self.circle, level, &ring, &mut budget.looks);
-                }
                 let least = if depth <= finest { 3.2 } else { 8.0 };
                 // Smaller sizes have the larger circles; but short arcs of them are exact in the
                 // larger ones only.
@@ -324,24 +295,46 @@ impl AContrario {
                 } else {
                     (20.0, 60.0)
                 };
-                widest(Searching {
-                    search: Search {
-                        circle: &self.circle,
-                        outline: &self.outline,
-                        radii: (
-                            (radii.0 as f32 / scale).max(least),
-                            (radii.1 as f32 / scale).min(most),
-                        ),
-                        most_radius: (radii.1 as f32 / scale).min(most_of_arcs),
-                        scale,
-                        seed: self.config.seed,
-                        mirror_slack,
-                    },
-                    prover: &mut prover,
-                    level,
-                    collected: &mut self.collected,
-                    budget,
-                });
+                let mut listed = None;
+                loop {
+                    let proofs = prover.proofs.iter().filter(|proof| proof.is_beyond_doubt());
+                    edges.found.clear();
+                    edges
+                        .found
+                        .extend(proofs.map(|proof| proof.in_frame().shrunk(scale)));
+                    if let Some(before) = listed {
+                        let shapes = (&self.outline, &self.circle);
+                        let news = self.collected.proven(scale).skip(before);
+                        if !edges.list_rest(shapes, news, deadline, &mut budget.looks) {
+                            return;
+                        }
+                    }
+                    listed = Some(listed.map_or(0, |_| self.collected.proven(scale).count()));
+                    let level = &mut edges.level;
+                    budget.begin_size(last);
+                    for ring in &edges.found {
+                        self.outline
+                            .explain(&self.circle, level, ring, &mut budget.looks);
+                    }
+                    widest(Searching {
+                        search: Search {
+                            circle: &self.circle,
+                            outline: &self.outline,
+                            radii: (
+                                (radii.0 as f32 / scale).max(least),
+                                (radii.1 as f32 / scale).min(most),
+                            ),
+                            most_radius: (radii.1 as f32 / scale).min(most_of_arcs),
+                            scale,
+                            seed: self.config.seed,
+                            mirror_slack,
+                        },
+                        prover: &mut prover,
+                        level,
+                        collected: &mut self.collected,
+                        budget,
+                    });
+                }
             };
         let [coarse, fine] = &mut self.edges;
         (coarse.late, fine.late, fine.small) = (false, false, false);
@@ -352,17 +345,17 @@ impl AContrario {
             || {
                 for depth in (finest + 1..=smallest).rev() {
                     edges_of(depth, coarse, false);
-                    search(depth, &mut coarse.level, radii, &mut self.budget, false);
+                    search(depth, coarse, radii, &mut self.budget, false);
                 }
             },
             || edges_of(finest, fine, least < radii.0),
         );
-        let (level, small) = (&mut fine.level, fine.small);
+        let small = fine.small;
         self.budget.extend(small);
-        search(finest, level, radii, &mut self.budget, !small);
+        search(finest, fine, radii, &mut self.budget, !small);
         if small {
             edges_of(0, fine, false);
-            search(0, &mut fine.level, (least, first), &mut self.budget, true);
+            search(0, fine, (least, first), &mut self.budget, true);
         }
         self.budget.spent |= fine.late || coarse.late;
         let found = &mut self.collected;
@@ -420,8 +413,6 @@ pub fn detect_circles(
 
 /// Frames with a shorter side hold nothing, pixels.
 const LEAST_SIDE: u32 = 12;
-/// Deviation of the Gaussian that smooths each size, its pixels.
-const SMOOTHING: f32 = 0.8;
 /// Largest number of halvings of a frame.
 const DEEPEST: usize = 5;
 /// Frames of so many pixels are worth a second thread.
@@ -434,9 +425,6 @@ const STEP_GAIN: f32 = 2.3;
 const NOISE_FACTOR: f32 = 3.5;
 /// Noise that rounding adds at each size, gray levels.
 const ROUNDING: f32 = 0.3;
-/// Time to list the edges of a frame, in units of the time to find them: a constant, and a factor
-/// of the fraction of pixels that are edges.
-const LISTING: (f64, f64) = (0.3, 8.0);
 /// Circles about one place that differ noticeably, at each size.
 const RADII: usize = 12;
 
@@ -450,30 +438,6 @@ fn both(apart: bool, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
     let _ = apart;
     one();
     other();
-}
-
-/// The edges of a size.
-#[derive(Clone, Debug)]
-struct Edges {
-    maxima: Maxima,
-    thinning: Thinning,
-    level: Level,
-    /// Set once a deadline has left out edges of the frame.
-    late: bool,
-    /// Set if small closed outlines are seen.
-    small: bool,
-}
-
-impl Edges {
-    fn new() -> Self {
-        Self {
-            maxima: Maxima::new(SMOOTHING),
-            thinning: Thinning::default(),
-            level: Level::default(),
-            late: false,
-            small: false,
-        }
-    }
 }
 
 /// The search of a level.

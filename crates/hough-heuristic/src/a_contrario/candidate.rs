@@ -104,6 +104,13 @@ impl Collected {
         self.most = most;
     }
 
+    /// The circles proven so far, in pixels of a frame that are `scale` times as large.
+    pub(super) fn proven(&self, scale: f32) -> impl Iterator<Item = Ring> {
+        self.proven
+            .iter()
+            .map(move |known| known.ring().shrunk(scale))
+    }
+
     /// Counts a meeting; returns `true` if the circle is proven or has been met often enough.
     pub(super) fn is_known(&mut self, circle: &Candidate, budget: &mut Budget) -> bool {
         budget.looks += self.candidates.len() as u64 / 8;

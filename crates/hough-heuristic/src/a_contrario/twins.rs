@@ -4,9 +4,11 @@
 use image::{GrayImage, Luma};
 use proptest::prelude::*;
 
+use super::listed::SMOOTHING;
 use super::polar::Ring;
 use super::report::Measuring;
 use super::*;
+use crate::edges::Maxima;
 
 /// A ball of some radius in noise, with bars across.
 fn frame(ball: &Ring, noise: f32, seed: u64) -> GrayImage {

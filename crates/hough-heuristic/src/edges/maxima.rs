@@ -42,6 +42,11 @@ impl Maxima {
         self.noise_gain
     }
 
+    /// The maxima found last.
+    pub(crate) fn found(&self) -> &[Candidate] {
+        &self.candidates
+    }
+
     /// The maxima above `threshold`, in gray levels of Sobel's gradient, row by row; none in a
     /// frame below 3x3, or if the deadline passes before they are all found.
     pub(crate) fn find(

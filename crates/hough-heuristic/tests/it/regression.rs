@@ -332,9 +332,14 @@ fn discs(count: u32, pitch: f64, radius: f64) -> (GrayImage, Vec<Circle>) {
             200.0
         }
     });
+    (frame, grid(count, pitch, radius))
+}
+
+/// Where they are.
+fn grid(count: u32, pitch: f64, radius: f64) -> Vec<Circle> {
     let place = |k: u32| (f64::from(k) + 0.5) * pitch;
     let circles = (0..count * count).map(|k| circle(place(k % count), place(k / count), radius));
-    (frame, circles.collect())
+    circles.collect()
 }
 
 #[test]
@@ -349,6 +354,32 @@ fn hundreds_of_circles_are_all_found() {
         }
         let effort = detector.effort();
         assert!(effort.proven as usize >= circles.len() && !effort.ended_by_count);
+    }
+}
+
+#[test]
+fn faint_discs_close_to_strong_ones_are_all_found() {
+    for (count, pitch, radius) in [(12, 25.0, 9.5), (20, 19.0, 7.0)] {
+        let side = (f64::from(count) * pitch).ceil() as u32;
+        let circles = grid(count, pitch, radius);
+        // Two of three discs have a third of the contrast of the others.
+        let frame = Picture { side, ..PLAIN }.draw(|x, y| {
+            let place = |at: f64| ((at / pitch) as u32).min(count - 1);
+            let index = place(y) * count + place(x);
+            let step = if index % 3 == 0 { 140.0 } else { 45.0 };
+            if within(&circles[index as usize], x, y) {
+                200.0 - step
+            } else {
+                200.0
+            }
+        });
+        for (turned, at) in views(&frame).iter().step_by(5) {
+            let mut detector = detector(0.8 * radius, 40.0);
+            let found = detector.detect(turned).unwrap();
+            assert_eq!(found.len(), circles.len(), "radius {radius}");
+            let is_found = |disc: &Circle| found.iter().any(|one| same(&one.circle, disc, 0.5));
+            assert!(circles.iter().map(at).all(|disc| is_found(&disc)));
+        }
     }
 }
 
