@@ -99,18 +99,22 @@ pub enum AgentError {
         now: Option<Box<RunEvent<'static>>>,
     },
     /// The arm reports an angle that is not finite.
-    #[error("the arm reports an angle of {joint} that is not finite")]
+    #[error("the arm reports an angle of {name} that is not finite")]
     Pose {
         /// First joint without a finite angle.
         joint: Joint,
+        /// Its name, see [`AgentConfig::joint_names`](crate::AgentConfig::joint_names).
+        name: String,
     },
     /// A search or a recovery named a pose that is not finite.
-    #[error("viewpoint {number} is no pose to look from: its {joint} is not finite")]
+    #[error("viewpoint {number} is no pose to look from: its {name} is not finite")]
     Viewpoint {
         /// Number of the viewpoint.
         number: usize,
         /// First joint without a finite angle.
         joint: Joint,
+        /// Its name.
+        name: String,
     },
     /// A text is not a saved run, or its controller cannot be made again.
     #[error("this text is no saved run: {0}")]

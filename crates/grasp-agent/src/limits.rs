@@ -1,6 +1,6 @@
 //! Working limits: the ranges that a task keeps the joints in, and its longest steps.
 
-use puma_val2::{Joint, JointDelta, Joints};
+use puma_val2::{Arm, Joint, JointDelta, Joints, Kinematics};
 use serde::{Deserialize, Serialize};
 
 /// Range that a task keeps each joint in, radians (low, high), `JT1` first; both ends included.
@@ -50,10 +50,11 @@ impl JointLimits {
     }
 
     /// Checks that every range is one.
-    pub(crate) fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self, name: impl Fn(Joint) -> String) -> Result<(), String> {
         for (joint, (low, high)) in Joint::ALL.into_iter().zip(self.0) {
             if !(low.is_finite() && high.is_finite() && low <= high) {
-                return Err(format!("the limits of {joint} are {low} to {high} radians"));
+                let name = name(joint);
+                return Err(format!("the limits of {name} are {low} to {high} radians"));
             }
         }
         Ok(())
@@ -114,10 +115,10 @@ impl JointLimits {
 }
 
 /// Checks the longest steps of a continuous controller, `JT1` first.
-pub(crate) fn check_steps(steps: &[f64; 3]) -> Result<(), String> {
-    let mut steps = Joint::ALL.into_iter().zip(steps);
-    steps.try_for_each(|(joint, most)| {
-        crate::checked::above_zero(&format!("the longest step of {joint}"), *most)
+pub(crate) fn check_steps(steps: &[f64; 3], arm: &Arm) -> Result<(), String> {
+    let mut steps = arm.names().into_iter().zip(steps);
+    steps.try_for_each(|(name, most)| {
+        crate::checked::above_zero(&format!("the longest step of {name}"), *most)
     })
 }
 

@@ -39,19 +39,19 @@ impl Sighting {
 pub struct Percept {
     /// Centre and radius of the ball's outline, feature units (192x144).
     pub features: Features,
-    /// The paper's angle theta 3 "between J2 and J3", degrees: `JT3` -
-    /// [`THETA3_ZERO`](Percept::THETA3_ZERO).
+    /// The paper's angle theta 3 "between J2 and J3", degrees: the angle of the third joint less
+    /// [`BehaviourSpec::theta3_zero`](crate::BehaviourSpec::theta3_zero).
     pub theta3: f64,
 }
 
 impl Percept {
-    /// `JT3` at which theta 3 is zero, degrees.
+    /// `JT3` of a PUMA at which theta 3 is zero, degrees.
     ///
     /// The paper gives no zero. With this one the goal poses of a reachable ball fill its interval
     /// \[0 : 40\] (10th to 90th percentile: -1 to 33).
     pub const THETA3_ZERO: f64 = 170.0;
 
-    /// Creates the percept of `features` seen from the pose `joints`.
+    /// Creates the percept of `features` seen from the pose `joints` of a PUMA.
     pub fn new(features: Features, joints: &Joints) -> Self {
         Self {
             features,

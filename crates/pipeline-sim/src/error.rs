@@ -166,11 +166,13 @@ pub enum SightError {
         greatest: f64,
     },
     /// A pose out of the working limits.
-    #[error("the pose has {joint} at {:.1} degrees, out of the working limits {:.1}..{:.1}",
+    #[error("the pose has {name} at {:.1} degrees, out of the working limits {:.1}..{:.1}",
         angle.to_degrees(), low.to_degrees(), high.to_degrees())]
     OutOfLimits {
         /// First such joint.
         joint: Joint,
+        /// Its name.
+        name: String,
         /// Its angle, radians.
         angle: f64,
         /// Its lower limit, radians.
@@ -178,6 +180,19 @@ pub enum SightError {
         /// Its upper limit, radians.
         high: f64,
     },
+}
+
+impl SightError {
+    /// Returns the error of a joint at an angle out of its limits.
+    pub(crate) fn out_of((low, high): (f64, f64), joint: Joint, name: &str, angle: f64) -> Self {
+        Self::OutOfLimits {
+            joint,
+            name: name.into(),
+            angle,
+            low,
+            high,
+        }
+    }
 }
 
 /// Refuses a value that is not usable.

@@ -111,13 +111,15 @@ pub enum ArmError {
     },
     /// The arm stands, but not where it was sent.
     #[error(
-        "{port}: {joint} was sent to {wanted_degrees:.3} degrees but reports {reported_degrees:.3}"
+        "{port}: {name} was sent to {wanted_degrees:.3} degrees but reports {reported_degrees:.3}"
     )]
     NotReached {
         /// The line.
         port: String,
         /// Joint that is furthest off.
         joint: Joint,
+        /// Its name, as the arm calls it.
+        name: String,
         /// Goal.
         wanted_degrees: f64,
         /// Reported angle.
@@ -125,12 +127,14 @@ pub enum ArmError {
     },
     /// A move would take a joint out of its limits; nothing was sent.
     #[error(
-        "{joint} cannot go to {wanted_degrees:.3} degrees: its range is {min_degrees:.1} to \
+        "{name} cannot go to {wanted_degrees:.3} degrees: its range is {min_degrees:.1} to \
          {max_degrees:.1}"
     )]
     JointLimit {
         /// Joint.
         joint: Joint,
+        /// Its name, as the arm calls it.
+        name: String,
         /// Goal.
         wanted_degrees: f64,
         /// Lower limit.
@@ -139,10 +143,12 @@ pub enum ArmError {
         max_degrees: f64,
     },
     /// An angle is NaN or infinite; nothing was sent.
-    #[error("the angle asked of {joint} is not a finite number")]
+    #[error("the angle asked of {name} is not a finite number")]
     NotFinite {
         /// Joint.
         joint: Joint,
+        /// Its name, as the arm calls it.
+        name: String,
     },
     /// The controller has been started again in mid-session and asks its start-up questions.
     /// Connect and calibrate again.

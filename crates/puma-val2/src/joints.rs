@@ -20,6 +20,9 @@ impl Joint {
     /// All joints, waist first.
     pub const ALL: [Self; 6] = [Self::J1, Self::J2, Self::J3, Self::J4, Self::J5, Self::J6];
 
+    /// VAL's names, waist first.
+    pub const NAMES: [&str; 6] = ["JT1", "JT2", "JT3", "JT4", "JT5", "JT6"];
+
     /// Returns the position in an array of six, 0 for `J1`.
     pub const fn index(self) -> usize {
         self as usize
@@ -33,7 +36,7 @@ impl Joint {
 
 impl fmt::Display for Joint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "JT{}", self.number())
+        f.write_str(Self::NAMES[self.index()])
     }
 }
 

@@ -61,9 +61,14 @@ pub(crate) fn with_speeds(ranges: [(f64, f64); 6], speeds: [f64; 6]) -> [JointRa
 ///
 /// # Errors
 /// [`ArmError::NotFinite`] or [`ArmError::JointLimit`] for the first joint that fails.
-pub(crate) fn check(ranges: &[JointRange; 6], joints: &Joints) -> Result<(), ArmError> {
+pub(crate) fn check(
+    ranges: &[JointRange; 6],
+    names: [&str; 6],
+    joints: &Joints,
+) -> Result<(), ArmError> {
     if let Some(joint) = joints.non_finite() {
-        return Err(ArmError::NotFinite { joint });
+        let name = names[joint.index()].into();
+        return Err(ArmError::NotFinite { joint, name });
     }
     // VAL prints thousandths of a degree: an arm at its stop may report that much beyond it.
     let slack = 0.0005_f64.to_radians();
@@ -72,6 +77,7 @@ pub(crate) fn check(ranges: &[JointRange; 6], joints: &Joints) -> Result<(), Arm
         if joints[joint] < range.min - slack || joints[joint] > range.max + slack {
             return Err(ArmError::JointLimit {
                 joint,
+                name: names[joint.index()].into(),
                 wanted_degrees: joints[joint].to_degrees(),
                 min_degrees: range.min.to_degrees(),
                 max_degrees: range.max.to_degrees(),

@@ -33,11 +33,14 @@ pub trait Manipulator {
     /// The errors of [`Manipulator::move_by`].
     fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError>;
 
-    /// Opens or closes the gripper.
+    /// Opens or closes the gripper (default: nothing, for an arm without one).
     ///
     /// # Errors
     /// Errors of the line or the controller.
-    fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError>;
+    fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
+        let _ = gripper;
+        Ok(())
+    }
 
     /// Stops the arm at once.
     ///

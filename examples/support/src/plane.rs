@@ -81,7 +81,7 @@ impl ExactPlane {
 
     /// Returns what is perceived after the move, `None` when the ball is lost.
     pub fn after(&self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
-        self.model.approaching(JointLimits::paper())(percept, delta)
+        simulator(&self.model, &BehaviourSpec::approaching())(percept, delta)
             .filter(|after| self.sight.sees_features(&after.features))
     }
 
@@ -98,7 +98,7 @@ impl ExactPlane {
         rng: &mut dyn Rng,
         on_progress: &mut dyn FnMut(&Record) -> ControlFlow<()>,
     ) -> Result<Lesson, BehaviourError> {
-        let mut plane = self.model.approaching(JointLimits::paper());
+        let mut plane = simulator(&self.model, &spec);
         let simulate = |percept: &Percept, delta: &JointDelta| {
             let after = plane(percept, delta)?;
             self.sight.sees_features(&after.features).then_some(after)
@@ -107,6 +107,15 @@ impl ExactPlane {
         let config = LearningSettings::paper(actions)?;
         spec.learn(simulate, start, trials, &config, rng, on_progress)
     }
+}
+
+/// Returns the exact simulator of a PUMA with its hand as the search poses have it.
+fn simulator(
+    model: &CameraModel,
+    spec: &BehaviourSpec,
+) -> impl FnMut(&Percept, &JointDelta) -> Option<Percept> + use<> {
+    let [pose, ..] = Workspace::paper().search_poses();
+    model.approaching(spec, JointLimits::paper(), &pose)
 }
 
 /// Returns `count` balls as the search finds them, turned into the arm's plane, with the optimum

@@ -10,11 +10,7 @@ use crate::behaviour::policy::{Behaviour, KAPPA};
 use crate::behaviour::spec::BehaviourSpec;
 use crate::behaviour::task::BehaviourTask;
 use crate::error::BehaviourError;
-use crate::limits::JointLimits;
 use crate::percept::Percept;
-
-/// Working range of `JT3`, degrees. A move beyond it is not chosen.
-const ELBOW_RANGE: (f64, f64) = JointLimits::PAPER_DEGREES[2];
 
 /// Result of learning a behaviour.
 #[derive(Clone, Debug)]
@@ -204,9 +200,10 @@ impl Trials {
         mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
     ) -> Self {
         let mut trials = Self::default();
+        let (low, high) = behaviour.spec().theta3_range;
         let within = |now: &Percept, delta: &JointDelta| {
-            let turned = now.theta3 + Percept::THETA3_ZERO + delta[Joint::J3].to_degrees();
-            (ELBOW_RANGE.0..=ELBOW_RANGE.1).contains(&turned)
+            let turned = now.theta3 + delta[Joint::J3].to_degrees();
+            (low..=high).contains(&turned)
         };
         for start in starts {
             let run = behaviour.steps_to_goal(start, KAPPA, Self::MOST, within, &mut simulate);
@@ -271,6 +268,7 @@ mod tests {
     use crate::limits::JointLimits;
     use crate::sight::camera_model::CameraModel;
     use hough_heuristic::Features;
+    use puma_val2::Joints;
 
     #[test]
     fn actions_that_lose_the_ball_in_a_trial_are_removed() {
@@ -297,10 +295,11 @@ mod tests {
         let mut table = QTable::new(spec.states(), spec.actions()).expect("not empty");
         table.set(state, long, 740.0).expect("in the table");
         table.set(state, short, 700.0).expect("in the table");
-        let behaviour = Behaviour::new(spec, table).expect("fits");
+        let wrist = Joints::from_degrees([0.0, 0.0, 0.0, 0.0, 45.0, 0.0]);
+        let behaviour = Behaviour::new(spec.clone(), table).expect("fits");
 
         let model = CameraModel::paper();
-        let mut plane = model.approaching(JointLimits::paper());
+        let mut plane = model.approaching(&spec, JointLimits::paper(), &wrist);
         // Seen is what shows 60 % of its outline.
         let seen = |f: &Features| {
             let inside = (0..360).filter(|degree| {

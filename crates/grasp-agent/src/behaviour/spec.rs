@@ -1,12 +1,13 @@
 //! Behaviours as data: states, actions, goal and reward, with the paper's values as presets.
 
 use hough_heuristic::Features;
-use puma_val2::{Joint, JointDelta};
+use puma_val2::{Joint, JointDelta, Joints};
 use qtable::{Action, Error, Intervals, State, Status, Step};
 use serde::{Deserialize, Serialize};
 
 use crate::behaviour::reward::Reward;
 use crate::behaviour::space::StateSpace;
+use crate::limits::JointLimits;
 use crate::percept::{Input, Percept};
 
 /// A behaviour as data, without its table.
@@ -27,6 +28,23 @@ pub struct BehaviourSpec {
     pub goal: Vec<GoalInterval>,
     /// Reward that teaches it.
     pub reward: Reward,
+    /// Angle of the third joint at which theta 3 is zero, degrees (default
+    /// [`Percept::THETA3_ZERO`]).
+    #[serde(default = "puma_zero")]
+    pub theta3_zero: f64,
+    /// Range of theta 3 that trials of a table keep to, degrees (default -50 to 45, the range of
+    /// `JT3` in [`JointLimits::paper`](crate::JointLimits::paper)).
+    #[serde(default = "puma_range")]
+    pub theta3_range: (f64, f64),
+}
+
+fn puma_zero() -> f64 {
+    Percept::THETA3_ZERO
+}
+
+fn puma_range() -> (f64, f64) {
+    let (low, high) = JointLimits::PAPER_DEGREES[2];
+    (low - puma_zero(), high - puma_zero())
 }
 
 /// Steps that a behaviour can make with one joint.
@@ -145,6 +163,8 @@ impl BehaviourSpec {
             }],
             goal: vec![GoalInterval::X],
             reward: Reward::centering_literal().mended(),
+            theta3_zero: puma_zero(),
+            theta3_range: puma_range(),
         }
     }
 
@@ -174,6 +194,8 @@ impl BehaviourSpec {
             ],
             goal: vec![GoalInterval::Y, GoalInterval::R],
             reward: Reward::approaching_literal().mended(),
+            theta3_zero: puma_zero(),
+            theta3_range: puma_range(),
         }
     }
 
@@ -248,6 +270,12 @@ impl BehaviourSpec {
         })
     }
 
+    /// Returns what the behaviour perceives of `features` from the pose `joints`.
+    pub fn percept(&self, features: Features, joints: &Joints) -> Percept {
+        let theta3 = joints[Joint::J3].to_degrees() - self.theta3_zero;
+        Percept { features, theta3 }
+    }
+
     /// Returns the state of `percept`.
     ///
     /// # Errors
@@ -298,6 +326,13 @@ impl BehaviourSpec {
 
     /// Checks that a program could run it.
     pub(crate) fn check(&self) -> Result<(), String> {
+        let (low, high) = self.theta3_range;
+        if !(self.theta3_zero.is_finite() && low <= high) {
+            let zero = self.theta3_zero;
+            return Err(format!(
+                "theta 3 is zero at {zero} degrees and goes from {low} to {high}"
+            ));
+        }
         let axes = self.space.inputs().len();
         if self.inputs.len() != axes {
             return Err(format!(
@@ -331,7 +366,8 @@ impl BehaviourSpec {
             () if self.inputs != other.inputs || self.space != other.space => "state space",
             () if self.moves != other.moves => "set of actions",
             () if self.goal != other.goal => "goal",
-            () => "reward",
+            () if self.reward != other.reward => "reward",
+            () => "angle theta 3",
         }
     }
 

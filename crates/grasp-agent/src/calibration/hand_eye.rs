@@ -119,7 +119,8 @@ impl HandEye {
             }
             let joints = arm.move_to(goes_to)?;
             if let Some(joint) = joints.non_finite() {
-                return Err(AgentError::Pose { joint });
+                let name = self.nominal.arm.names()[joint.index()].into();
+                return Err(AgentError::Pose { joint, name });
             }
             if let Some(ball) = eye.look()?.filter(Sighting::is_finite) {
                 looks.push((joints, ball.features));
@@ -206,7 +207,8 @@ impl HandEye {
     fn check(&self) -> Result<(), AgentError> {
         let checked = || {
             self.nominal.check()?;
-            self.limits.check()?;
+            self.limits
+                .check(|joint| self.nominal.arm.names()[joint.index()].into())?;
             above_zero("the clearance", self.clearance)?;
             if !(0.0..1.0).contains(&self.approach) {
                 return Err(format!("the approach is {}; give 0 to 1", self.approach));

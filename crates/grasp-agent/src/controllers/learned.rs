@@ -139,7 +139,8 @@ impl Learned {
     /// Returns what the behaviours perceive of a ball.
     fn percept(&self, ball: &Sighting, joints: &Joints) -> Percept {
         let ball = self.goal.map_or(*ball, |goal| goal.as_untaught(ball));
-        Percept::new(ball.features, joints)
+        let spec = self.approaching.behaviour.spec();
+        spec.percept(ball.features, joints)
     }
 
     /// Sets the repetition penalties, units of Q. The penalty is subtracted from the Q of an action

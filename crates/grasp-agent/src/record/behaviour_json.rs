@@ -31,7 +31,7 @@ impl Behaviour {
     /// # Errors
     /// [`BehaviourError::Text`] names the fault and its place: text that is not JSON, a missing
     /// part, edges that do not increase, a wrong number of rows or values, a joint that is moved
-    /// twice, no goal, another frame size or zero of theta 3.
+    /// twice, no goal, another frame size.
     pub fn from_json(text: &str) -> Result<Self, BehaviourError> {
         let json: BehaviourJson = serde_json::from_str(text).map_err(|e| bad(e.to_string()))?;
         json.try_into()
@@ -54,7 +54,10 @@ impl From<&Behaviour> for BehaviourJson {
         let rows = (0..table.states()).map(|state| table.row(State(state)).to_vec());
         Self {
             format: FORMAT.into(),
-            conventions: Conventions::default(),
+            conventions: Conventions {
+                theta3_zero_degrees: behaviour.spec().theta3_zero,
+                ..Conventions::default()
+            },
             spec: behaviour.spec().clone(),
             q: rows.collect(),
         }
@@ -67,7 +70,11 @@ impl TryFrom<BehaviourJson> for Behaviour {
     fn try_from(json: BehaviourJson) -> Result<Self, BehaviourError> {
         check_format(&json.format, FORMAT)?;
         json.conventions.check()?;
-        Self::new(json.spec, table_of(&json.q)?)
+        let spec = BehaviourSpec {
+            theta3_zero: json.conventions.theta3_zero_degrees,
+            ..json.spec
+        };
+        Self::new(spec, table_of(&json.q)?)
     }
 }
 
@@ -138,12 +145,6 @@ impl Conventions {
             return Err(bad(format!(
                 "its frame is {:?} units, expected {:?}: scale x, y and r",
                 self.frame, ours.frame
-            )));
-        }
-        if differs(self.theta3_zero_degrees, ours.theta3_zero_degrees) {
-            return Err(bad(format!(
-                "its theta 3 is zero at JT3 = {} degrees, expected {}: shift its edges",
-                self.theta3_zero_degrees, ours.theta3_zero_degrees
             )));
         }
         Ok(())
@@ -238,8 +239,8 @@ mod tests {
             (|d| d["reward"]["terms"] = serde_json::json!([]), "no terms"),
             (|d| d["inputs"] = serde_json::json!(["Y", "R"]), "2 inputs"),
             (
-                |d| d["conventions"]["theta3_zero_degrees"] = 180.0.into(),
-                "JT3 = 180",
+                |d| d["theta3_range"] = serde_json::json!([1.0, -1.0]),
+                "from 1 to -1",
             ),
             (|d| d["conventions"]["frame"][0] = 768.0.into(), "768"),
         ];

@@ -1,12 +1,13 @@
 //! Settings of an agent.
 
-use puma_val2::{Joint, JointDelta, Joints};
+use puma_val2::{Joint, JointDelta, Joints, Kinematics};
 use serde::{Deserialize, Serialize};
 
 use crate::behaviour::spec::GoalInterval;
 use crate::checked::above_zero;
 use crate::controllers::taught_goal::TaughtGoal;
 use crate::limits::JointLimits;
+use crate::percept::Percept;
 
 /// Settings of an [`Agent`](crate::Agent).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,6 +37,11 @@ pub struct AgentConfig {
     pub recovery: Vec<JointDelta>,
     /// Range that each joint is kept in, finite (default [`JointLimits::paper`]).
     pub limits: JointLimits,
+    /// Name of each joint in errors and logs; `""` for an unused place (default `JT1` to `JT6`).
+    pub joint_names: [String; 6],
+    /// Angle of the third joint at which theta 3 of a goal interval is zero, degrees (default
+    /// [`Percept::THETA3_ZERO`](crate::Percept::THETA3_ZERO)).
+    pub theta3_zero: f64,
     /// Moves after the first sighting before the run is given up, at least 1 (default 60). Two
     /// looks at the goal that show the ball at different places, or not at all the second time,
     /// count as a move.
@@ -108,6 +114,8 @@ impl AgentConfig {
                 .map(|(j1, j2)| JointDelta::from_degrees([j1, j2, 0.0, 0.0, 0.0, 0.0]))
                 .into(),
             limits: JointLimits::paper(),
+            joint_names: Joint::NAMES.map(Into::into),
+            theta3_zero: Percept::THETA3_ZERO,
             max_cycles: 60,
             max_views: 1000,
             looks: 2,
@@ -118,6 +126,39 @@ impl AgentConfig {
             reach_tolerance: 1_f64.to_radians(),
             same_frames: 2,
             lag_check: None,
+        }
+    }
+
+    /// Returns the settings for an arm: its limits and the names of its joints. Search again,
+    /// recovery and lift turn the first two joints as far as those of [`AgentConfig::paper`], the
+    /// second one in the direction that raises the hand in the first search pose; the grip is to be
+    /// taught.
+    pub fn for_arm(arm: &impl Kinematics, search_poses: impl Into<Vec<Joints>>) -> Self {
+        let mut config = Self::paper(search_poses);
+        config.limits = JointLimits(arm.limits());
+        config.joint_names = arm.names().map(Into::into);
+        let from = config.search_poses.first().copied().unwrap_or_default();
+        let height = |turn: f64| {
+            let pose = from + JointDelta::of(Joint::J2, turn);
+            arm.forward(&pose).translation.z
+        };
+        // A PUMA's second joint raises the hand by a negative turn.
+        if height(1e-3) > height(-1e-3) {
+            let turned = config.search_again.iter_mut().chain(&mut config.recovery);
+            turned
+                .chain(&mut config.lift)
+                .for_each(|delta| delta.0[1] = -delta.0[1]);
+        }
+        config
+    }
+
+    /// Returns the name of a joint.
+    pub(crate) fn name(&self, joint: Joint) -> String {
+        let name = &self.joint_names[joint.index()];
+        if name.is_empty() {
+            joint.to_string()
+        } else {
+            name.clone()
         }
     }
 
@@ -133,7 +174,7 @@ impl AgentConfig {
 
     /// Checks what can be known before anything moves.
     pub(crate) fn check(&self) -> Result<(), String> {
-        self.limits.check()?;
+        self.limits.check(|joint| self.name(joint))?;
         for (name, count, remedy) in [
             (
                 "search_poses",
@@ -169,7 +210,8 @@ impl AgentConfig {
             let turn = self.grip[joint];
             if turn.is_nan() || turn != 0.0 && turn.abs() > high - low {
                 return Err(format!(
-                    "grip turns {joint} by {} degrees, farther than its working limits are apart",
+                    "grip turns {} by {} degrees, farther than its working limits are apart",
+                    self.name(joint),
                     turn.to_degrees()
                 ));
             }
@@ -187,6 +229,9 @@ impl AgentConfig {
                 "left_behind is {}; it must be a radius, 0 or above",
                 self.left_behind
             ));
+        }
+        if !self.theta3_zero.is_finite() {
+            return Err(format!("theta3_zero is {}; give degrees", self.theta3_zero));
         }
         above_zero("reach_tolerance", self.reach_tolerance)?;
         above_zero("approach_radius", self.approach_radius)?;

@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use puma_val2::{Arm, Joint, JointDelta, Joints, PumaParams};
 
+use crate::behaviour::spec::BehaviourSpec;
 use crate::limits::JointLimits;
 use crate::percept::Percept;
 use crate::sight::camera_model::CameraModel;
@@ -12,43 +13,46 @@ impl CameraModel {
     /// the frame or outside it. A move of `JT3` out of its limits is not made. The percept is
     /// `None` if the ball has no image.
     ///
-    /// A PUMA has `JT5` at 45 degrees; of any other arm the joints but `JT3` begin in the middle of
-    /// their limits. The axes of `JT2` and `JT3` are parallel: turning arm and ball together about
-    /// the shoulder then changes nothing, and the percept (x, y, r, theta 3) is the whole state.
+    /// `spec` gives the zero of theta 3, and all joints but `JT3` stand as in `pose`. The axes of
+    /// `JT2` and `JT3` are parallel: turning arm and ball together about the shoulder then changes
+    /// nothing, and the percept (x, y, r, theta 3) is the whole state.
     pub fn approaching(
         &self,
+        spec: &BehaviourSpec,
         limits: JointLimits,
+        pose: &Joints,
     ) -> impl FnMut(&Percept, &JointDelta) -> Option<Percept> + use<> {
-        let model = *self;
+        let (model, pose, zero) = (*self, *pose, spec.theta3_zero);
         let mut plane = match &self.arm {
-            Arm::Puma(arm) => Some(ArmPlane::new(self, arm, limits)),
+            Arm::Puma(arm) => Some(ArmPlane::new(self, arm, limits, &pose, zero)),
             Arm::Serial { .. } => None,
         };
-        let middle = Joints(limits.0.map(|(low, high)| 0.5 * (low + high)));
         move |percept, delta| match &mut plane {
             Some(plane) => plane.after(percept, delta),
-            None => model.approached(percept, delta, &limits, middle),
+            None => model.approached(percept, delta, &limits, (pose, zero)),
         }
     }
 
     /// Returns the percept after a move by the general kinematics, with the joints but `JT3` at
-    /// `others` before it.
+    /// `others` before it, and theta 3 zero at `zero` degrees.
     fn approached(
         &self,
         percept: &Percept,
         delta: &JointDelta,
         limits: &JointLimits,
-        others: Joints,
+        (others, zero): (Joints, f64),
     ) -> Option<Percept> {
         let mut joints = others;
-        joints.0[Joint::J3.index()] = (percept.theta3 + Percept::THETA3_ZERO).to_radians();
+        joints.0[Joint::J3.index()] = (percept.theta3 + zero).to_radians();
         let moved = joints + *delta;
         let (low, high) = limits.0[Joint::J3.index()];
         if !(low..=high).contains(&moved[Joint::J3]) {
             return Some(*percept);
         }
         let ball = self.locate(&joints, &percept.features)?;
-        Some(Percept::new(self.view(&moved, &ball)?, &moved))
+        let theta3 = moved[Joint::J3].to_degrees() - zero;
+        let features = self.view(&moved, &ball)?;
+        Some(Percept { features, theta3 })
     }
 }
 
@@ -58,6 +62,8 @@ impl CameraModel {
 struct ArmPlane {
     model: CameraModel,
     limits: JointLimits,
+    /// Zero of theta 3, degrees.
+    zero: f64,
     /// Vector from the shoulder to the elbow, in a frame that turns with the upper arm.
     elbow: Vector3<f64>,
     /// Camera in a frame that turns with the forearm, with its origin in the elbow.
@@ -68,14 +74,22 @@ struct ArmPlane {
 }
 
 impl ArmPlane {
-    fn new(model: &CameraModel, arm: &PumaParams, limits: JointLimits) -> Self {
-        let stretched = Joints::from_degrees([0.0, 0.0, 0.0, 0.0, 45.0, 0.0]);
+    fn new(
+        model: &CameraModel,
+        arm: &PumaParams,
+        limits: JointLimits,
+        pose: &Joints,
+        zero: f64,
+    ) -> Self {
+        let [_, _, _, wrist @ ..] = pose.0;
+        let stretched = Joints([0.0, 0.0, 0.0, wrist[0], wrist[1], wrist[2]]);
         let elbow = Vector3::new(arm.a2, arm.d2, 0.0);
         let from_elbow =
             Isometry3::translation(-elbow.x, -elbow.y, -elbow.z) * arm.wrist(&stretched);
         Self {
             model: *model,
             limits,
+            zero,
             elbow,
             camera: from_elbow * model.mount,
             last: None,
@@ -85,7 +99,7 @@ impl ArmPlane {
     fn after(&mut self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
         let turned = delta[Joint::J3];
         let theta3 = percept.theta3 + turned.to_degrees();
-        let jt3 = (theta3 + Percept::THETA3_ZERO).to_radians();
+        let jt3 = (theta3 + self.zero).to_radians();
         let (low, high) = self.limits.0[Joint::J3.index()];
         if !(low..=high).contains(&jt3) {
             return Some(*percept);
@@ -122,8 +136,10 @@ mod tests {
     #[test]
     fn the_plane_equals_the_camera_model_along_walks_and_jumps() {
         let (model, limits) = (CameraModel::paper(), JointLimits::paper());
-        let mut plane = model.approaching(limits);
+        let spec = BehaviourSpec::approaching();
         let others = Joints::from_degrees([0.0, -60.0, 0.0, 0.0, 45.0, 0.0]);
+        let mut plane = model.approaching(&spec, limits, &others);
+        let general = (others, spec.theta3_zero);
         let start = Percept {
             features: Features::new(98.0, 60.0, 10.0),
             theta3: 30.0,
@@ -141,7 +157,7 @@ mod tests {
             ]);
             let (quick, slow) = (
                 plane(&percept, &delta),
-                model.approached(&percept, &delta, &limits, others),
+                model.approached(&percept, &delta, &limits, general),
             );
             let (Some(quick), Some(slow)) = (quick, slow) else {
                 assert!(quick.is_none() && slow.is_none());

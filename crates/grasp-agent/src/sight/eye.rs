@@ -20,6 +20,13 @@ pub trait Eye {
     }
 }
 
+/// A camera and a detector as one function.
+impl<F: FnMut() -> Result<Option<Sighting>, FrameError>> Eye for F {
+    fn look(&mut self) -> Result<Option<Sighting>, FrameError> {
+        self()
+    }
+}
+
 /// A camera and the target that is looked for in its frames.
 pub struct CameraEye<'a> {
     source: &'a mut dyn FrameSource,

@@ -1,8 +1,8 @@
 //! The hybrid on arms other than the PUMA.
 
 use grasp_agent::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use grasp_agent::puma_val2::{Arm, JointDelta, Joints, Kinematics};
-use grasp_agent::{Agent, AgentConfig, CameraModel, EventLog, Hybrid, HybridSettings, JointLimits};
+use grasp_agent::puma_val2::{Arm, ArmError, JointDelta, Joints, Kinematics, Manipulator};
+use grasp_agent::{Agent, AgentConfig, CameraModel, EventLog, Hybrid, HybridSettings};
 
 use crate::plant::{Level, MODERATE, NONE, Odd, Plant, Site};
 
@@ -21,10 +21,7 @@ fn ur5() -> Site {
             tool: 0.100,
             ..paper
         },
-        config: AgentConfig {
-            limits: JointLimits(arm.limits()),
-            ..AgentConfig::paper([-50.0, -25.0, 0.0, 25.0, 50.0].map(pose))
-        },
+        config: AgentConfig::for_arm(&arm, [-50.0, -25.0, 0.0, 25.0, 50.0].map(pose)),
         from: Joints::from_degrees([0.0, -45.0, 70.0, -80.0, -90.0, 0.0]),
         grip: JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, -18.0, 0.0]),
         balls: [(0.35, 0.6), (120.0, 240.0), (0.0, 0.05)],
@@ -43,14 +40,153 @@ fn so101() -> Site {
             tool: 0.140,
             ..paper
         },
-        config: AgentConfig {
-            limits: JointLimits(arm.limits()),
-            ..AgentConfig::paper([-60.0, -36.0, -12.0, 12.0, 36.0, 60.0].map(pose))
-        },
+        config: AgentConfig::for_arm(&arm, [-60.0, -36.0, -12.0, 12.0, 36.0, 60.0].map(pose)),
         from: Joints::from_degrees([0.0, 53.0, -33.0, 0.0, 60.0, 0.0]),
         grip: JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, -20.0, 0.0]),
         balls: [(0.2, 0.34), (-60.0, 60.0), (0.0, 0.03)],
     }
+}
+
+/// An arm of seven joints in the proportions of a Panda, the third of which stands still.
+struct Seven;
+
+impl Kinematics for Seven {
+    fn forward(&self, joints: &Joints) -> Isometry3<f64> {
+        let [q1, q2, q4, q5, q6, q7] = joints.0;
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let rows = [
+            (0.0, 0.333, 0.0, q1),
+            (0.0, 0.0, -quarter, q2),
+            (0.0, 0.316, quarter, 0.0),
+            (0.0825, 0.0, quarter, q4),
+            (-0.0825, 0.384, -quarter, q5),
+            (0.0, 0.0, quarter, q6),
+            (0.088, 0.0, quarter, q7),
+            (0.0, 0.107, 0.0, 0.0),
+        ];
+        rows.iter()
+            .fold(Isometry3::identity(), |pose, &(a, d, alpha, q)| {
+                let link =
+                    Translation3::new(a, 0.0, 0.0) * Isometry3::rotation(Vector3::x() * alpha);
+                pose * link * Isometry3::rotation(Vector3::z() * q) * Translation3::new(0.0, 0.0, d)
+            })
+    }
+
+    fn limits(&self) -> [(f64, f64); 6] {
+        let (wide, elbow, wrist) = ((-2.9, 2.9), (-3.07, -0.07), (-0.02, 3.75));
+        [wide, (-1.76, 1.76), elbow, wide, wrist, wide]
+    }
+
+    fn names(&self) -> [&str; 6] {
+        ["joint1", "joint2", "joint4", "joint5", "joint6", "joint7"]
+    }
+}
+
+fn seven() -> Site {
+    let (paper, arm) = (CameraModel::paper(), Arm::of(&Seven).unwrap());
+    let pose = |pan: f64| Joints([pan, -0.5, -2.2, 0.0, 1.9, 0.0]);
+    Site {
+        nominal: CameraModel {
+            arm,
+            mount: Translation3::new(-0.060, 0.0, -0.040) * paper.mount.rotation,
+            tool: 0.120,
+            ..paper
+        },
+        config: AgentConfig::for_arm(&arm, [-0.9, -0.45, 0.0, 0.45, 0.9].map(pose)),
+        from: Joints([0.0, 0.25, -2.25, 0.0, 2.5, 0.0]),
+        grip: JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, -18.0, 0.0]),
+        balls: [(0.4, 0.6), (-50.0, 50.0), (0.0, 0.05)],
+    }
+}
+
+/// An arm of four joints that turn the other way round than a PUMA's, with the last in the place of
+/// `JT4`.
+struct Four;
+
+impl Kinematics for Four {
+    fn forward(&self, joints: &Joints) -> Isometry3<f64> {
+        let [pan, lift, elbow, flex, ..] = joints.0;
+        let (z, y) = (Vector3::z(), Vector3::y());
+        let link = |turn, x, z| Isometry3::rotation(turn) * Translation3::new(x, 0.0, z);
+        let shoulder = link(-z * pan, 0.012, 0.077) * link(-y * lift, 0.024, 0.128);
+        let hand = link(-y * elbow, 0.124, 0.0) * link(-y * flex, 0.0, 0.0);
+        shoulder * hand * Isometry3::rotation(y * std::f64::consts::FRAC_PI_2)
+    }
+
+    fn limits(&self) -> [(f64, f64); 6] {
+        [3.1, 1.9, 1.6, 2.0, 0.0, 0.0].map(|most| (-most, most))
+    }
+
+    fn names(&self) -> [&str; 6] {
+        ["joint1", "joint2", "joint3", "joint4", "", ""]
+    }
+}
+
+fn four() -> Site {
+    let (paper, arm) = (CameraModel::paper(), Arm::of(&Four).unwrap());
+    let pose = |pan: f64| Joints::from_degrees([pan, 30.0, -30.0, -60.0, 0.0, 0.0]);
+    Site {
+        nominal: CameraModel {
+            arm,
+            focal: 166.0,
+            mount: Translation3::new(-0.040, 0.0, 0.020) * paper.mount.rotation,
+            tool: 0.140,
+            ..paper
+        },
+        config: AgentConfig::for_arm(&arm, [-60.0, -30.0, 0.0, 30.0, 60.0].map(pose)),
+        from: Joints::from_degrees([0.0, -48.0, 28.0, -60.0, 0.0, 0.0]),
+        grip: JointDelta::from_degrees([0.0, 0.0, 0.0, 20.0, 0.0, 0.0]),
+        balls: [(0.19, 0.3), (-60.0, 60.0), (0.0, 0.03)],
+    }
+}
+
+#[test]
+fn arms_of_seven_and_of_four_joints_are_learned_and_grasp() {
+    for (name, site) in [("seven", seven()), ("four", four())] {
+        let (held, moves) = held(&site, MODERATE, 3, 6);
+        assert!(held == 6 && moves < 48, "{name}: {held} of 6, {moves}");
+    }
+}
+
+/// An arm whose third joint does not move.
+struct Stuck(Joints);
+
+impl Manipulator for Stuck {
+    fn joints(&mut self) -> Result<Joints, ArmError> {
+        Ok(self.0)
+    }
+
+    fn move_to(&mut self, mut target: Joints) -> Result<Joints, ArmError> {
+        target.0[2] = self.0.0[2];
+        self.0 = target;
+        Ok(target)
+    }
+
+    fn stop(&mut self) -> Result<(), ArmError> {
+        Ok(())
+    }
+}
+
+#[test]
+fn errors_and_logs_call_a_joint_by_its_name_in_the_arm() {
+    let (mut site, mut log) = (four(), EventLog::default());
+    site.config.grip = site.grip;
+    let mut config = site.config.clone();
+    config.limits.0[2] = (1.0, -1.0);
+    let controller = Hybrid::new(HybridSettings::paper());
+    let refused = Agent::with_controller(config, controller.clone()).unwrap_err();
+    assert!(
+        refused.to_string().contains("limits of joint3"),
+        "{refused}"
+    );
+    let mut agent = Agent::with_controller(site.config, controller).unwrap();
+    let mut nothing = || Ok(None);
+    let mut arm = Stuck(Joints::default());
+    let end = agent.run_and_learn(&mut nothing, &mut arm, &mut (), &mut |e| log.note(e));
+    let error = end.unwrap_err().to_string();
+    assert!(error.contains("joint3 was sent to -30.000"), "{error}");
+    let logged = format!("{:?}", log.events.last());
+    assert!(logged.contains("joint3"), "{logged}");
 }
 
 /// Balls held of so many in one cell with the goal taught there, and moves.

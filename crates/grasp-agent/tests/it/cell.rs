@@ -303,6 +303,7 @@ impl Manipulator for Shared {
                 return Err(ArmError::NotReached {
                     port: "ttyUSB0".into(),
                     joint: Joint::J1,
+                    name: "JT1".into(),
                     wanted_degrees: target.degrees()[0],
                     reported_degrees: cell.joints.degrees()[0],
                 });

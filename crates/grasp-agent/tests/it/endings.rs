@@ -178,7 +178,8 @@ fn a_viewpoint_that_is_not_finite_is_an_error_and_no_pose() {
                     error,
                     AgentError::Viewpoint {
                         number: 3,
-                        joint: Joint::J2
+                        joint: Joint::J2,
+                        ..
                     }
                 ),
                 "{error}"

@@ -102,7 +102,13 @@ fn an_arm_that_does_not_say_where_it_stands_is_moved_no_more() {
         let (end, log, cell) = end_of(Fault::Nowhere(moves));
         let error = end.unwrap_err();
         assert!(
-            matches!(error, AgentError::Pose { joint: Joint::J2 }),
+            matches!(
+                error,
+                AgentError::Pose {
+                    joint: Joint::J2,
+                    ..
+                }
+            ),
             "{moves}: {error}"
         );
         assert!(cell.0.borrow().stops > 0 && cell.0.borrow().joints.non_finite().is_none());

@@ -168,7 +168,13 @@ fn a_pose_that_is_not_finite_is_kept_and_replayed() {
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::Nowhere(3));
     let mut log = EventLog::default();
     let end = cell.run(&mut agent.clone(), &mut log);
-    assert!(matches!(end, Err(AgentError::Pose { joint: Joint::J2 })));
+    assert!(matches!(
+        end,
+        Err(AgentError::Pose {
+            joint: Joint::J2,
+            ..
+        })
+    ));
     for event in &log.events {
         saved.note(event);
     }

@@ -27,7 +27,7 @@ fn settings_that_cannot_work_are_refused_with_the_reason() {
         |settings| settings.check(),
         &[
             (|s| s.drift = -1.0, "drift is -1"),
-            (|s| s.grip_turn = f64::NAN, "grip_turn is NaN"),
+            (|s| s.grip[1] = f64::NAN, "a turn of grip is NaN"),
             (|s| s.steps[1] = 0.0, "longest step of JT2 is 0"),
             (|s| s.goal.r = -33.0, "radius of the goal is -33"),
             (|s| s.prior.turn = 0.0, "prior is 0"),

@@ -381,15 +381,11 @@ impl Cell {
 
     /// Returns a pose, or the first joint that is out of the working limits.
     fn in_limits(&self, pose: Joints) -> Result<Joints, SightError> {
-        match self.joint_out_of_limits(&pose) {
-            None => Ok(pose),
-            Some(joint) => Err(SightError::OutOfLimits {
-                joint,
-                angle: pose[joint],
-                low: self.limits[joint.index()].0,
-                high: self.limits[joint.index()].1,
-            }),
-        }
+        let Some(joint) = self.joint_out_of_limits(&pose) else {
+            return Ok(pose);
+        };
+        let (name, limits) = (self.arm.names()[joint.index()], self.limits[joint.index()]);
+        Err(SightError::out_of(limits, joint, name, pose[joint]))
     }
 
     /// Returns [`Cell::goal_pose`] of any arm, by Newton's method in `JT1` to `JT3`.

@@ -115,7 +115,8 @@ impl<T: Transport> Val2Client<T> {
 
     fn relative(&mut self, delta: JointDelta, means: Means) -> Result<Joints, ArmError> {
         if let Some(joint) = Joints(delta.0).non_finite() {
-            return Err(ArmError::NotFinite { joint });
+            let name = joint.to_string();
+            return Err(ArmError::NotFinite { joint, name });
         }
         let start = match self.last_known() {
             Some(joints) => joints,
@@ -338,6 +339,7 @@ impl<T: Transport> Val2Client<T> {
         ArmError::NotReached {
             port: self.wire.port(),
             joint,
+            name: joint.to_string(),
             wanted_degrees: target[joint].to_degrees(),
             reported_degrees: stands[joint].to_degrees(),
         }

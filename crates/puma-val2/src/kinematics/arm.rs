@@ -1,6 +1,8 @@
 //! Arms of any make: kinematics as a trait, and an arm as data.
 
+use std::collections::BTreeSet;
 use std::f64::consts::FRAC_PI_2;
+use std::sync::{Mutex, PoisonError};
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
@@ -19,6 +21,12 @@ pub trait Kinematics {
 
     /// Returns the range of each joint, radians (low, high); (0, 0) for an unused place.
     fn limits(&self) -> [(f64, f64); 6];
+
+    /// Returns the name of each joint, for errors and logs; `""` for an unused place (default `JT1`
+    /// to `JT6`).
+    fn names(&self) -> [&str; 6] {
+        Joint::NAMES
+    }
 }
 
 impl Kinematics for PumaParams {
@@ -58,7 +66,39 @@ pub enum Arm {
         home: Isometry3<f64>,
         /// Range of each joint, radians (low, high).
         limits: [(f64, f64); 6],
+        /// Name of each joint; `""` for an unused place.
+        #[cfg_attr(
+            feature = "serde",
+            serde(default = "numbered", deserialize_with = "read_names")
+        )]
+        names: [&'static str; 6],
     },
+}
+
+/// Returns names that live as long as the program. Each different one is stored once, so that an
+/// [`Arm`] can be copied.
+pub(crate) fn lasting(names: [&str; 6]) -> [&'static str; 6] {
+    static KNOWN: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    names.map(|name| match known.get(name) {
+        Some(name) => *name,
+        None => {
+            let name: &'static str = Box::leak(name.into());
+            known.insert(name);
+            name
+        }
+    })
+}
+
+#[cfg(feature = "serde")]
+fn numbered() -> [&'static str; 6] {
+    Joint::NAMES
+}
+
+#[cfg(feature = "serde")]
+fn read_names<'de, D: serde::Deserializer<'de>>(from: D) -> Result<[&'static str; 6], D::Error> {
+    let names: [String; 6] = serde::Deserialize::deserialize(from)?;
+    Ok(lasting(names.each_ref().map(String::as_str)))
 }
 
 impl From<PumaParams> for Arm {
@@ -76,6 +116,13 @@ impl Kinematics for Arm {
         match self {
             Self::Puma(params) => Kinematics::limits(params),
             Self::Serial { limits, .. } => *limits,
+        }
+    }
+
+    fn names(&self) -> [&str; 6] {
+        match self {
+            Self::Puma(params) => params.names(),
+            Self::Serial { names, .. } => *names,
         }
     }
 }
@@ -118,7 +165,7 @@ impl Arm {
                 speed: f64::INFINITY,
             }),
         };
-        limits::check(&ranges, joints)
+        limits::check(&ranges, self.names(), joints)
     }
 
     /// Returns the arm with upper arm and forearm longer by these lengths, metres. Of a chain the
@@ -173,7 +220,9 @@ impl Arm {
     pub fn of(arm: &impl Kinematics) -> Result<Self, ArmError> {
         let home = arm.forward(&Joints::default());
         let mut axes = [(Point3::origin(), Vector3::zeros()); 6];
+        let mut names = arm.names();
         for joint in Joint::ALL {
+            let name = names[joint.index()];
             let mut quarter = Joints::default();
             quarter.0[joint.index()] = FRAC_PI_2;
             let Isometry3 {
@@ -189,10 +238,13 @@ impl Arm {
                         axis.into_inner(),
                     )
                 }
-                _ if shift.norm() < 1e-9 => continue,
+                _ if shift.norm() < 1e-9 => {
+                    names[joint.index()] = "";
+                    continue;
+                }
                 _ => {
                     return Err(ArmError::Other(format!(
-                        "{joint} slides, or is not finite; only turning joints can be described"
+                        "{name} slides, or is not finite; only turning joints can be described"
                     )));
                 }
             };
@@ -201,6 +253,7 @@ impl Arm {
             axes,
             home,
             limits: arm.limits(),
+            names: lasting(names),
         };
         for at in [0.3, -0.7, 1.1] {
             let joints = Joints(std::array::from_fn(|i| at * (1.0 + 0.2 * i as f64)));
@@ -236,6 +289,14 @@ impl Arm {
                 UnitQuaternion::from_axis_angle(&Vector3::x_axis(), FRAC_PI_2),
             ),
             limits: [(-360_f64.to_radians(), 360_f64.to_radians()); 6],
+            names: [
+                "shoulder_pan_joint",
+                "shoulder_lift_joint",
+                "elbow_joint",
+                "wrist_1_joint",
+                "wrist_2_joint",
+                "wrist_3_joint",
+            ],
         }
     }
 
@@ -262,6 +323,14 @@ impl Arm {
                 UnitQuaternion::from_axis_angle(&Vector3::y_axis(), FRAC_PI_2),
             ),
             limits: degrees.map(|most| (-most.to_radians(), most.to_radians())),
+            names: [
+                "shoulder_pan",
+                "shoulder_lift",
+                "elbow_flex",
+                "",
+                "wrist_flex",
+                "wrist_roll",
+            ],
         }
     }
 
@@ -293,6 +362,7 @@ mod tests {
         let read = Arm::of(&puma).unwrap();
         assert!(matches!(read, Arm::Serial { .. }));
         assert_eq!(read.limits(), Kinematics::limits(&puma));
+        assert_eq!(read.names(), Joint::NAMES);
         for k in 0..20 {
             let joints = Joints(std::array::from_fn(|i| (k * (i + 3)) as f64 % 5.3 - 2.5));
             assert!(off(&read.forward(&joints), &puma.forward(&joints)) < 1e-12);
@@ -344,7 +414,12 @@ mod tests {
             assert!(off(&longer[0], &longer[1]) < 1e-12);
         }
         let far = Joints::from_degrees([0.0, 170.0, 0.0, 0.0, 0.0, 0.0]);
-        assert!(Arm::so101().check(&far).is_err() && Arm::ur5().check(&far).is_ok());
+        let refused = Arm::so101().check(&far).unwrap_err().to_string();
+        assert!(
+            refused.starts_with("shoulder_lift cannot go to 170"),
+            "{refused}"
+        );
+        assert!(Arm::ur5().check(&far).is_ok());
     }
 
     struct Odd(fn(&Joints) -> Isometry3<f64>);

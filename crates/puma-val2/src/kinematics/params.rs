@@ -1,7 +1,7 @@
 //! The arm as data: link lengths, joint ranges, joint speeds.
 
 use crate::error::ArmError;
-use crate::joints::Joints;
+use crate::joints::{Joint, Joints};
 use crate::limits::{self, JointRange};
 
 /// Geometry and limits of a PUMA, in VAL's joint angles.
@@ -140,6 +140,6 @@ impl PumaParams {
     /// # Errors
     /// [`ArmError::NotFinite`] or [`ArmError::JointLimit`] for the first joint that fails.
     pub fn check(&self, joints: &Joints) -> Result<(), ArmError> {
-        limits::check(&self.ranges, joints)
+        limits::check(&self.ranges, Joint::NAMES, joints)
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 
-use crate::kinematics::arm::Arm;
+use crate::kinematics::arm::{Arm, lasting};
 
 /// Reads the arm with the given hand and joints.
 pub(crate) fn read(text: &str, hand: &str, joints: [&str; 6]) -> Result<Arm, String> {
@@ -43,7 +43,12 @@ pub(crate) fn read(text: &str, hand: &str, joints: [&str; 6]) -> Result<Arm, Str
     if !found.is_sorted() || (0..6).any(twice) {
         return Err("name the joints in their order from the base, each once".into());
     }
-    Ok(Arm::Serial { axes, home, limits })
+    Ok(Arm::Serial {
+        axes,
+        home,
+        limits,
+        names: lasting(joints),
+    })
 }
 
 /// Returns the joints from the base to the link `hand`.
@@ -135,6 +140,7 @@ mod tests {
     fn a_small_arm_is_read_with_turned_frames_and_a_fixed_wrist() {
         let arm = Arm::from_urdf(TWO, "hand", ["pan", "", "lift", "", "", ""]).unwrap();
         assert_eq!(arm.limits()[1..3], [(0.0, 0.0), (-1.0, 2.0)]);
+        assert_eq!(arm.names()[..3], ["pan", "", "lift"]);
         let hand = arm.forward(&Joints::from_degrees([90.0, 5.0, 90.0, 0.0, 0.0, 0.0]));
         let expected = Point3::new(0.0, 0.2, 0.1 + 0.3);
         // The axis of `lift` is -y: a positive angle raises the hand.

@@ -82,7 +82,10 @@ fn moves_out_of_range_are_refused_before_anything_is_sent() {
     );
     assert_matches!(
         client.drive(Joint::J2, f64::NAN, 100.0),
-        Err(ArmError::NotFinite { joint: Joint::J2 })
+        Err(ArmError::NotFinite {
+            joint: Joint::J2,
+            ..
+        })
     );
     assert_matches!(
         client.drive(Joint::J2, 0.1, 0.0),
@@ -96,7 +99,10 @@ fn moves_out_of_range_are_refused_before_anything_is_sent() {
     nowhere.0[5] = f64::INFINITY;
     assert_matches!(
         client.move_to(nowhere),
-        Err(ArmError::NotFinite { joint: Joint::J6 })
+        Err(ArmError::NotFinite {
+            joint: Joint::J6,
+            ..
+        })
     );
     assert_eq!(client.line().traffic(), before);
 }

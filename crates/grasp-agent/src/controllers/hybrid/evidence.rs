@@ -1,7 +1,7 @@
 //! Sightings, the poses they were made from, and the true joint angles behind play and arm errors.
 
 use hough_heuristic::Features;
-use puma_val2::Joints;
+use puma_val2::{Arm, Joints};
 use serde::{Deserialize, Serialize};
 
 use crate::controllers::hybrid::parameters::{Numbers, at};
@@ -128,10 +128,10 @@ impl Evidence {
     }
 
     /// Returns the evidence with a path on which `JT2` turns `JT3` by this share.
-    pub(crate) fn dragged(&self, share: f64) -> Self {
-        let mut evidence = self.clone();
+    pub(crate) fn dragged(&self, share: f64, arm: &Arm) -> Self {
+        let (mut evidence, [middle, _]) = (self.clone(), middle(arm));
         for pose in &mut evidence.path {
-            pose.0[2] += share * (pose.0[1] - MIDDLE[0]);
+            pose.0[2] += share * (pose.0[1] - middle);
         }
         evidence
     }
@@ -183,8 +183,8 @@ impl Evidence {
     }
 
     /// Returns the true joint angles at each sighting and at the grip.
-    pub(crate) fn stands(&self, numbers: &Numbers) -> Stands {
-        let mut links = Links::new(numbers);
+    pub(crate) fn stands(&self, numbers: &Numbers, arm: &Arm) -> Stands {
+        let mut links = Links::new(numbers, arm);
         let mut stands = Stands {
             views: Vec::with_capacity(self.sightings.len()),
             held: None,
@@ -203,8 +203,8 @@ impl Evidence {
     }
 
     /// Returns the links at the end of the path.
-    pub(crate) fn links(&self, numbers: &Numbers) -> Links {
-        let mut links = Links::new(numbers);
+    pub(crate) fn links<'a>(&self, numbers: &Numbers, arm: &'a Arm) -> Links<'a> {
+        let mut links = Links::new(numbers, arm);
         for motors in &self.path {
             links.follow(motors);
         }
@@ -215,24 +215,31 @@ impl Evidence {
 /// Links of the arm. Those of the first three joints follow their motors once the backlash is taken
 /// up, and stand beside them by the errors of the arm.
 #[derive(Clone, Debug)]
-pub(crate) struct Links {
+pub(crate) struct Links<'a> {
+    arm: &'a Arm,
     half: [f64; 3],
     /// Zero of `JT3`, gears of `JT2` and `JT3`, sag, coupling.
-    arm: [f64; 5],
+    errors: [f64; 5],
     /// Angles with the backlash, before the errors of the arm.
     driven: Joints,
     begun: bool,
 }
 
-/// Angles of `JT2` and `JT3`, radians, at which gears and coupling displace nothing: the middle of
-/// the working range.
-const MIDDLE: [f64; 2] = [-1.4, 3.3];
+/// Returns the angles of `JT2` and `JT3`, radians, at which gears and coupling displace nothing:
+/// those of a PUMA at work, the middle of the range of another arm.
+fn middle(arm: &Arm) -> [f64; 2] {
+    match arm {
+        Arm::Puma(_) => [-1.4, 3.3],
+        Arm::Serial { limits, .. } => [1, 2].map(|i: usize| 0.5 * (limits[i].0 + limits[i].1)),
+    }
+}
 
-impl Links {
-    fn new(numbers: &Numbers) -> Self {
+impl<'a> Links<'a> {
+    fn new(numbers: &Numbers, arm: &'a Arm) -> Self {
         Self {
+            arm,
             half: std::array::from_fn(|i| 0.5 * numbers[at::PLAY + i].max(0.0)),
-            arm: std::array::from_fn(|i| numbers[at::ARM + i]),
+            errors: std::array::from_fn(|i| numbers[at::ARM + i]),
             driven: Joints::default(),
             begun: false,
         }
@@ -260,10 +267,16 @@ impl Links {
     }
 
     fn bent(&self, driven: &Joints) -> Joints {
-        let [zero, gear2, gear3, sag, coupling] = self.arm;
-        let [j2, j3] = [driven.0[1] - MIDDLE[0], driven.0[2] - MIDDLE[1]];
+        let [zero, gear2, gear3, sag, coupling] = self.errors;
+        let middle = middle(self.arm);
+        let [j2, j3] = [driven.0[1] - middle[0], driven.0[2] - middle[1]];
         let mut bent = *driven;
-        bent.0[1] += gear2 * j2 + sag * driven.0[1].cos() + coupling * j3;
+        let fall = if sag == 0.0 {
+            0.0
+        } else {
+            sag * self.arm.droop(driven)
+        };
+        bent.0[1] += gear2 * j2 + fall + coupling * j3;
         bent.0[2] += zero + gear3 * j3;
         bent
     }

@@ -45,7 +45,7 @@ impl Fit {
         let model = corrected(nominal, start);
         let mut numbers = *start;
         let first_guess = |evidence: &&Evidence| {
-            let (joints, features) = *evidence.stands(start).views.last()?;
+            let (joints, features) = *evidence.stands(start, &nominal.arm).views.last()?;
             model.locate(&joints, &features)
         };
         let mut balls: Vec<_> = evidence.iter().map(first_guess).collect();
@@ -121,7 +121,7 @@ impl Fit {
             let Some(inverse) = inverse_of(&block.own, 0.0) else {
                 continue;
             };
-            let here = evidence.stands(&self.numbers);
+            let here = evidence.stands(&self.numbers, &nominal.arm);
             let views = |stands: &Stands, model: &CameraModel, ball: &Point3<f64>| {
                 let mut own = Matrix3::zeros();
                 let (mut nearest, mut unit) = (0.0, 1.0);
@@ -144,7 +144,11 @@ impl Fit {
                 let moved = ball - inverse * block.cross.row(i).transpose() * step;
                 let after = match i.checked_sub(at::PLAY) {
                     None => views(&here, &varied.models[i], &moved),
-                    Some(arm) => views(&evidence.stands(&varied.arms[arm]), &varied.model, &moved),
+                    Some(arm) => views(
+                        &evidence.stands(&varied.arms[arm], &nominal.arm),
+                        &varied.model,
+                        &moved,
+                    ),
                 };
                 let slope = 0.5 * (after - before) / step;
                 if slope.is_finite() {
@@ -168,7 +172,7 @@ impl Fit {
     ) -> Option<Evidence> {
         let ball = (*self.balls.first()?)?;
         let model = corrected(nominal, &self.numbers);
-        let stands = evidence.stands(&self.numbers);
+        let stands = evidence.stands(&self.numbers, &nominal.arm);
         let mut near = stands.views.iter().map(|(joints, f)| {
             let expected = seen(&model, &model.arm.wrist(joints), &ball);
             expected.is_some_and(|expected| (expected - vector(f)).norm() < far)
@@ -228,7 +232,7 @@ fn cost(
     noise: f64,
 ) -> f64 {
     let model = corrected(nominal, numbers);
-    let Stands { views, held } = evidence.stands(numbers);
+    let Stands { views, held } = evidence.stands(numbers, &nominal.arm);
     let of_view = |(joints, features)| match seen(&model, &model.arm.wrist(joints), ball) {
         Some(expected) => (expected - vector(features))
             .iter()
@@ -304,8 +308,12 @@ impl Normal {
             gradient: Vector3::zeros(),
             weights: Vec::new(),
         };
-        let Stands { views, held } = evidence.stands(&varied.numbers);
-        let moved: Vec<Stands> = varied.arms.iter().map(|n| evidence.stands(n)).collect();
+        let Stands { views, held } = evidence.stands(&varied.numbers, &varied.model.arm);
+        let moved: Vec<Stands> = varied
+            .arms
+            .iter()
+            .map(|n| evidence.stands(n, &varied.model.arm))
+            .collect();
         self.spare -= 3.0;
         for (index, (joints, features)) in views.iter().enumerate() {
             let wrist = varied.model.arm.wrist(joints);

@@ -106,7 +106,12 @@ pub(crate) fn misfit(
     let (least, ratio, number) = DEAD_ZONES;
     let zones = (0..number).map(|i| least * ratio.powi(i));
     let dead = zones.map(|zone| (Misfit::DeadZone, pair(&|record| record.sticking(zone))));
-    let dragged = DRAGS.map(|share| (Misfit::Arm, pair(&|record| record.dragged(share))));
+    let dragged = DRAGS.map(|share| {
+        (
+            Misfit::Arm,
+            pair(&|record| record.dragged(share, &nominal.arm)),
+        )
+    });
     let plainly = std::iter::once((Misfit::Outliers, pair(&Evidence::clone)));
     let causes = turned.into_iter().chain(late).chain(dead).chain(dragged);
     let number = record.len() as f64;

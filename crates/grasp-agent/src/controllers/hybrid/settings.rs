@@ -31,10 +31,8 @@ pub struct HybridSettings {
     pub caution: f64,
     /// Number of latest runs kept as evidence (default 400).
     pub memory: usize,
-    /// Turn of `JT5` for the grip, radians (default -18.01 degrees).
-    pub grip_turn: f64,
-    /// Turn of `JT4` for the grip, radians (default 0).
-    pub grip_aside: f64,
+    /// Turns of the last three joints for the grip, radians (default 0, -18.01 degrees, 0).
+    pub grip: [f64; 3],
     /// Largest standard deviation of an aimed grip from the ball, metres, at least 0 (default
     /// 0.008). Above it [`AgentConfig::grip`] is used, and after an aim that has missed if a goal
     /// was taught. Without a taught goal, aims that follow one that has missed lie beside it, along
@@ -55,8 +53,7 @@ impl HybridSettings {
             steps: JointLimits::PAPER_STEPS,
             caution: 2.0,
             memory: 400,
-            grip_turn: -18.01_f64.to_radians(),
-            grip_aside: 0.0,
+            grip: [0.0, -18.01_f64.to_radians(), 0.0],
             grip_certainty: 0.008,
         }
     }
@@ -69,13 +66,12 @@ impl HybridSettings {
         self.nominal.check()?;
         self.prior.check()?;
         check_goal(&self.goal)?;
-        check_steps(&self.steps)?;
+        check_steps(&self.steps, &self.nominal.arm)?;
         for (name, value, least) in [
             ("drift", self.drift, 0.0),
             ("caution", self.caution, 0.0),
             ("grip_certainty", self.grip_certainty, 0.0),
-            ("grip_turn", self.grip_turn, f64::MIN),
-            ("grip_aside", self.grip_aside, f64::MIN),
+            ("a turn of grip", self.grip.iter().sum(), f64::MIN),
         ] {
             if !(value.is_finite() && value >= least) {
                 let allowed = if least < 0.0 { "" } else { ", 0 or more" };

@@ -21,11 +21,11 @@ pub enum ServoLaw {
     /// Image-based visual servoing (the same, section VI) on centre and radius: removes the error
     /// in the image through the inverse of the image Jacobian at the present pose.
     ImageBased,
-    /// Image-based visual servoing with the Jacobian at [`ServoSettings::GOAL_POSE`], which is
-    /// constant.
+    /// Image-based visual servoing with the Jacobian at the pose of the goal
+    /// ([`ServoSettings::poses`]), which is constant.
     ImageBasedAtGoal,
     /// Image-based visual servoing on the features of a sphere, (x/r, y/r, 1/r), in which the
-    /// distance is linear (Chaumette 1990), with their Jacobian at [`ServoSettings::GOAL_POSE`].
+    /// distance is linear (Chaumette 1990), with their Jacobian at that pose.
     Sphere,
     /// The features of [`ServoLaw::Sphere`] with a Jacobian that Broyden's rank-one update
     /// corrects by each move (Jägersand, Fuentes, Nelson 1997). It begins each run anew.
@@ -100,7 +100,7 @@ impl Servo {
     /// Creates a servo controller.
     pub fn new(law: ServoLaw, settings: ServoSettings) -> Self {
         let at_goal = || {
-            let pose = Joints::from_degrees(ServoSettings::GOAL_POSE);
+            let [.., pose, _] = settings.poses;
             let ball = settings.model.locate(&pose, &settings.goal)?;
             settings.model.image_jacobian(&pose, &ball)
         };

@@ -2,7 +2,6 @@
 
 use hough_heuristic::Features;
 use nalgebra::{Matrix3, Vector3};
-use puma_val2::Joints;
 
 use crate::controllers::servo::controller::turns;
 use crate::controllers::servo::settings::ServoSettings;
@@ -19,14 +18,8 @@ struct Rule {
     turns: Matrix3<f64>,
 }
 
-/// Peaks of the four triangles, feature units, each with a pose (degrees of JT2 and JT3) in which
-/// balls of that radius are typically seen.
-const SETS: [(f64, f64, f64); 4] = [
-    (9.0, -105.0, 205.0),
-    (17.0, -80.0, 195.0),
-    (33.0, -57.0, 186.0),
-    (55.0, -57.0, 186.0),
-];
+/// Peaks of the four triangles, over the radius at the goal.
+const SETS: [f64; 4] = [9.0 / 33.0, 17.0 / 33.0, 1.0, 55.0 / 33.0];
 
 /// Weight of the row of 33 / r beside those of x and y, units.
 const NEARNESS: f64 = 60.0;
@@ -34,28 +27,31 @@ const NEARNESS: f64 = 60.0;
 impl Schedule {
     /// Derives the rules from the camera model of `settings`.
     pub(crate) fn new(settings: &ServoSettings) -> Self {
-        let rules = SETS.iter().filter_map(|&(radius, jt2, jt3)| {
-            let pose = Joints::from_degrees([0.0, jt2, jt3, 0.0, 45.0, 0.0]);
-            let typical = Features {
-                r: radius,
-                ..settings.goal
-            };
-            let ball = settings.model.locate(&pose, &typical)?;
-            let mut jacobian = settings.model.image_jacobian(&pose, &ball)?;
-            // From changes of r to changes of 33 / r, in which distance is linear; scaled up so
-            // that the three rows are alike.
-            let scale = -NEARNESS * 33.0 / (radius * radius);
-            jacobian.row_mut(2).scale_mut(scale);
-            let columns =
-                [Vector3::x(), Vector3::y(), Vector3::z() * NEARNESS].map(|e| turns(&jacobian, &e));
-            let [Some(x), Some(y), Some(nearness)] = columns else {
-                return None;
-            };
-            Some(Rule {
-                radius,
-                turns: Matrix3::from_columns(&[x, y, nearness]),
-            })
-        });
+        let rules = SETS
+            .iter()
+            .zip(&settings.poses)
+            .filter_map(|(share, pose)| {
+                let radius = share * settings.goal.r;
+                let typical = Features {
+                    r: radius,
+                    ..settings.goal
+                };
+                let ball = settings.model.locate(pose, &typical)?;
+                let mut jacobian = settings.model.image_jacobian(pose, &ball)?;
+                // From changes of r to changes of 33 / r, in which distance is linear; scaled up so
+                // that the three rows are alike.
+                let scale = -NEARNESS * 33.0 / (radius * radius);
+                jacobian.row_mut(2).scale_mut(scale);
+                let columns = [Vector3::x(), Vector3::y(), Vector3::z() * NEARNESS]
+                    .map(|e| turns(&jacobian, &e));
+                let [Some(x), Some(y), Some(nearness)] = columns else {
+                    return None;
+                };
+                Some(Rule {
+                    radius,
+                    turns: Matrix3::from_columns(&[x, y, nearness]),
+                })
+            });
         Self(rules.collect())
     }
 

@@ -2,6 +2,7 @@
 
 use hough_heuristic::Features;
 use nalgebra::{Matrix3, Vector3};
+use puma_val2::Joints;
 use serde::{Deserialize, Serialize};
 
 use crate::behaviour::spec::GoalInterval;
@@ -26,6 +27,9 @@ pub struct ServoSettings {
     /// that at the goal, the gain at the error e is (gain - far) exp(-slope e / (gain - far)) +
     /// far.
     pub adaptive: Option<[f64; 2]>,
+    /// Poses in which balls with 9/33, 17/33, 1 and 55/33 of the goal's radius are typically seen;
+    /// the third one is that at the goal (default: those of a PUMA).
+    pub poses: [Joints; 4],
     /// Largest turns of `JT1` to `JT3` in one move, radians (default
     /// [`JointLimits::PAPER_STEPS`]).
     pub steps: [f64; 3],
@@ -42,6 +46,13 @@ impl ServoSettings {
             goal: GoalInterval::paper_features(),
             gain: 1.0,
             adaptive: None,
+            poses: [
+                (-105.0, 205.0),
+                (-80.0, 195.0),
+                (-57.0, 186.0),
+                (-57.0, 186.0),
+            ]
+            .map(|(j2, j3)| Joints::from_degrees([0.0, j2, j3, 0.0, 45.0, 0.0])),
             steps: JointLimits::PAPER_STEPS,
         }
     }
@@ -86,6 +97,10 @@ impl ServoSettings {
         self.model.check()?;
         check_goal(&self.goal)?;
         above_zero("gain", self.gain)?;
+        if self.poses.iter().any(|pose| pose.non_finite().is_some()) {
+            let fault = "a pose in which balls are typically seen is not finite".into();
+            return Err(BehaviourError::Settings(fault));
+        }
         if let Some([far, slope]) = self.adaptive {
             above_zero("the gain far from the goal", far)?;
             above_zero("the slope of the gain", slope)?;
@@ -94,6 +109,6 @@ impl ServoSettings {
                 return Err(BehaviourError::Settings(fault));
             }
         }
-        Ok(check_steps(&self.steps)?)
+        Ok(check_steps(&self.steps, &self.model.arm)?)
     }
 }

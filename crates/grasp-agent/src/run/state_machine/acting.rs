@@ -133,7 +133,10 @@ impl Run<'_> {
         self.joints = joints;
         self.moved = true;
         match joints.non_finite() {
-            Some(joint) => Err(AgentError::Pose { joint }),
+            Some(joint) => Err(AgentError::Pose {
+                joint,
+                name: self.config.name(joint),
+            }),
             None => {
                 self.controller.notice(&Feedback::Arm(joints));
                 Ok(())
@@ -210,9 +213,11 @@ impl Run<'_> {
         let supervision = &mut self.modules.supervision;
         let fault = fault.or_else(|| {
             let joint = supervision.stuck(&target, &reached)?;
+            let name = self.config.name(joint);
             Some(ArmError::NotReached {
                 port: "the arm".into(),
                 joint,
+                name,
                 wanted_degrees: target[joint].to_degrees(),
                 reported_degrees: reached[joint].to_degrees(),
             })

@@ -1,6 +1,6 @@
 //! Gripper activation: the hand goes for the ball, the jaws close, and the grip is verified.
 
-use puma_val2::{Gripper, Joint, JointDelta, Joints};
+use puma_val2::{Gripper, JointDelta, Joints};
 
 use crate::controller::{Feedback, GaveUp};
 use crate::error::AgentError;
@@ -172,15 +172,18 @@ impl Run<'_> {
 }
 
 /// Splits a grip into two moves: first the arm and `JT4`, with the fingers still beside the ball,
-/// then the hand, which brings them to both sides of it. Small first moves are left out.
+/// then the hand, which brings them to both sides of it. Small first moves are left out. Of an arm
+/// that grips without the last two joints, `JT4` is the hand.
 fn in_two(delta: &JointDelta) -> [JointDelta; 2] {
     const HARDLY: f64 = 0.01;
     let mut parts = [JointDelta::default(), *delta];
-    if Joint::ALL[..4]
-        .iter()
-        .any(|joint| delta[*joint].abs() > HARDLY)
-    {
-        for i in 0..4 {
+    let arm = if delta.0[4..].iter().all(|turn| *turn == 0.0) {
+        3
+    } else {
+        4
+    };
+    if delta.0[..arm].iter().any(|turn| turn.abs() > HARDLY) {
+        for i in 0..arm {
             (parts[0].0[i], parts[1].0[i]) = (delta.0[i], 0.0);
         }
     }
@@ -190,6 +193,7 @@ fn in_two(delta: &JointDelta) -> [JointDelta; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use puma_val2::Joint;
 
     #[test]
     fn the_hand_turns_aside_before_it_swings_in() {
@@ -204,5 +208,9 @@ mod tests {
         );
         let plain = JointDelta::of(Joint::J5, -0.3);
         assert_eq!(in_two(&plain), [JointDelta::default(), plain]);
+        let both = in_two(&JointDelta::from_degrees([0.0, 3.0, 0.0, -9.0, 0.0, 0.0]));
+        assert!(
+            both[0][Joint::J2] > 0.0 && both[1] == JointDelta::of(Joint::J4, both[1][Joint::J4])
+        );
     }
 }

@@ -3,7 +3,7 @@
 use std::mem::discriminant;
 
 use hough_heuristic::image::GrayImage;
-use puma_val2::{Gripper, Joints, Manipulator, ProximitySensor};
+use puma_val2::{Gripper, Joint, Joints, Manipulator, ProximitySensor};
 
 use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
 use crate::controllers::hybrid::misfit::Misfit;
@@ -241,7 +241,12 @@ impl<'a> Run<'a> {
     ) -> Result<View, AgentError> {
         // A user-supplied search might name anything.
         if let Some(joint) = pose.non_finite() {
-            return Err(AgentError::Viewpoint { number, joint });
+            let name = self.config.name(joint);
+            return Err(AgentError::Viewpoint {
+                number,
+                joint,
+                name,
+            });
         }
         let target = self.modules.supervision.limits().nearest(&pose);
         Ok(match self.go_to(target, there)? {
@@ -253,7 +258,10 @@ impl<'a> Run<'a> {
     /// Makes one control cycle: decision, one joint move, next sighting.
     fn reach(&mut self, ball: &Sighting) -> Result<State, AgentError> {
         let from = self.joints;
-        let percept = Percept::new(ball.features, &from);
+        let percept = Percept {
+            features: ball.features,
+            theta3: from[Joint::J3].to_degrees() - self.config.theta3_zero,
+        };
         let mut goal = self.config.goal.iter();
         if goal.all(|interval| interval.holds(&percept)) {
             return self.begin_grip(*ball, true);

@@ -1,7 +1,7 @@
 //! Aiming of the grip.
 
 use nalgebra::{Matrix3, Point3, Vector3};
-use puma_val2::{Joint, JointDelta};
+use puma_val2::JointDelta;
 
 use crate::controller::Request;
 use crate::controllers::hybrid::controller::Hybrid;
@@ -29,14 +29,18 @@ impl Hybrid {
         if std::mem::take(&mut self.run.missed) && self.shown {
             return None;
         }
-        let links = self.run.evidence.links(&estimate.numbers);
+        let links = self
+            .run
+            .evidence
+            .links(&estimate.numbers, &self.settings.nominal.arm);
         let mut from = links.stand();
-        from.0[Joint::J5.index()] += self.settings.grip_turn;
-        from.0[Joint::J4.index()] += self.settings.grip_aside;
+        for (angle, turn) in from.0[3..].iter_mut().zip(self.settings.grip) {
+            *angle += turn;
+        }
         let stand = estimate.model.pose_gripping(&estimate.ball, &from)?;
         let motors = links.motors_for(&stand, &request.joints);
         let miss = |numbers: &Numbers, ball: &Point3<f64>| {
-            let mut links = self.run.evidence.links(numbers);
+            let mut links = self.run.evidence.links(numbers, &self.settings.nominal.arm);
             links.follow(&motors);
             Some(estimate.model.tool_point(&links.stand()) - ball)
         };

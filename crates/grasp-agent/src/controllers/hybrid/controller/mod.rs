@@ -2,7 +2,7 @@
 
 use hough_heuristic::Features;
 use nalgebra::Point3;
-use puma_val2::{Joint, JointDelta, Joints};
+use puma_val2::{JointDelta, Joints};
 
 use crate::controller::SavedController;
 use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
@@ -177,8 +177,8 @@ impl Hybrid {
         self.shown = true;
         self.remembered.insert(0, shown);
         self.settings.goal = goal.features();
-        self.settings.grip_turn = goal.grip()[Joint::J5];
-        self.settings.grip_aside = goal.grip()[Joint::J4];
+        let [_, _, _, grip @ ..] = goal.grip().0;
+        self.settings.grip = grip;
         self
     }
 
@@ -228,7 +228,7 @@ impl Hybrid {
             return None;
         }
         let view = |numbers: &Numbers, ball: &Point3<f64>| {
-            let links = self.run.evidence.links(numbers);
+            let links = self.run.evidence.links(numbers, &self.settings.nominal.arm);
             let seen = corrected(&self.settings.nominal, numbers).view(&links.stand(), ball);
             seen.as_ref().map(vector)
         };
@@ -249,7 +249,10 @@ impl Hybrid {
         Request { joints, limits, .. }: &Request,
     ) -> Option<JointDelta> {
         let model = &estimate.model;
-        let links = self.run.evidence.links(&estimate.numbers);
+        let links = self
+            .run
+            .evidence
+            .links(&estimate.numbers, &self.settings.nominal.arm);
         let stand = links.stand();
         let camera = model.arm.wrist(&stand) * model.mount;
         let here = camera.inverse_transform_point(&estimate.ball);
@@ -308,7 +311,7 @@ impl Hybrid {
     /// least `least` units.
     fn stays_in_view(&self, estimate: &Estimate, motors: &Joints, least: f64) -> bool {
         let view = |numbers: &Numbers, ball: &Point3<f64>| {
-            let mut links: Links = self.run.evidence.links(numbers);
+            let mut links: Links = self.run.evidence.links(numbers, &self.settings.nominal.arm);
             links.follow(motors);
             let seen = corrected(&self.settings.nominal, numbers).view(&links.stand(), ball);
             seen.as_ref().map(vector)
@@ -429,6 +432,7 @@ impl Controller for Hybrid {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use puma_val2::Joint;
 
     #[test]
     fn turns_are_cut_to_steps_and_nan_stays_nan() {
