@@ -295,6 +295,7 @@ impl AContrario {
                 } else {
                     (20.0, 60.0)
                 };
+                budget.begin_size(last);
                 let mut listed = None;
                 loop {
                     let proofs = prover.proofs.iter().filter(|proof| proof.is_beyond_doubt());
@@ -311,7 +312,6 @@ impl AContrario {
                     }
                     listed = Some(listed.map_or(0, |_| self.collected.proven(scale).count()));
                     let level = &mut edges.level;
-                    budget.begin_size(last);
                     for ring in &edges.found {
                         self.outline
                             .explain(&self.circle, level, ring, &mut budget.looks);

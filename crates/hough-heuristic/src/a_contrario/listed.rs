@@ -18,7 +18,7 @@ const LISTING: (f64, f64) = (0.3, 8.0);
 /// Least number of circles found since the last listing for another.
 const MANY: usize = 4;
 /// Length of the outlines found per edge point listed from which on the rest is listed.
-const LEAST_FOUND: f32 = 0.25;
+const LEAST_FOUND: f32 = 0.5;
 
 /// The edges of a size.
 #[derive(Clone, Debug)]

@@ -335,7 +335,7 @@ fn discs(count: u32, pitch: f64, radius: f64) -> (GrayImage, Vec<Circle>) {
     (frame, grid(count, pitch, radius))
 }
 
-/// Where they are.
+/// The discs of such a grid.
 fn grid(count: u32, pitch: f64, radius: f64) -> Vec<Circle> {
     let place = |k: u32| (f64::from(k) + 0.5) * pitch;
     let circles = (0..count * count).map(|k| circle(place(k % count), place(k / count), radius));
