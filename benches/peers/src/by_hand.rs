@@ -4,9 +4,7 @@ use qtable::{Action, State};
 use rand::RngExt;
 use std::hint::black_box;
 
-use crate::{
-    ACTIONS, ALPHA, GAMMA, Result, STATES, TEMPERATURE, rate, rng, small_step, transition,
-};
+use crate::{ACTIONS, ALPHA, GAMMA, Result, STATES, rate, rng, small_step, transition};
 
 /// The loop that one would write by hand for this problem alone: the maximum of each row kept, ties
 /// by the lowest index, and no checks.
@@ -42,8 +40,8 @@ pub fn by_hand(updates: u64) -> Result<f64> {
     measured
 }
 
-/// The loop by hand that does what the table does: it counts visits and draws among equally good
-/// actions. No checks.
+/// The loop by hand that does what the table does: it counts visits, draws among equally good
+/// actions, and stops at a value that is not finite.
 pub fn by_hand_alike(updates: u64) -> Result<f64> {
     let mut table = vec![[0.0f64; ACTIONS]; STATES];
     let mut visits = vec![[0u32; ACTIONS]; STATES];
@@ -67,6 +65,9 @@ pub fn by_hand_alike(updates: u64) -> Result<f64> {
             let row = &mut table[state];
             let old = row[action];
             let value = old + ALPHA * (target - old);
+            if !value.is_finite() {
+                return Err("a value is not finite".into());
+            }
             row[action] = value;
             visits[state][action] += 1;
             let (highest, first, equals) = &mut best[state];
@@ -88,14 +89,16 @@ pub fn by_hand_alike(updates: u64) -> Result<f64> {
     measured
 }
 
-/// A softmax by hand with the exponential of the standard library, at 500 states and 4 actions.
-pub fn softmax_by_hand(updates: u64) -> Result<f64> {
+/// A softmax by hand with the exponential of the standard library, at 500 states and 4 actions. It
+/// counts visits and stops at a value that is not finite, as the table does.
+pub fn softmax_by_hand(updates: u64, temperature: f64) -> Result<f64> {
     let mut table = vec![[0.0f64; 4]; 500];
+    let mut visits = vec![[0u32; 4]; 500];
     let (mut rng, mut state) = (rng(1), 0);
     let measured = rate(updates, || {
         for _ in 0..updates {
             let highest = table[state].iter().copied().fold(f64::MIN, f64::max);
-            let weights = table[state].map(|value| ((value - highest) / TEMPERATURE).exp());
+            let weights = table[state].map(|value| ((value - highest) / temperature).exp());
             let mut rest = rng.random::<f64>() * weights.iter().sum::<f64>();
             let action = weights.iter().position(|weight| {
                 rest -= weight;
@@ -106,11 +109,16 @@ pub fn softmax_by_hand(updates: u64) -> Result<f64> {
             let next = step.observation.0;
             let highest = table[next].iter().copied().fold(f64::MIN, f64::max);
             let old = table[state][action];
-            table[state][action] = old + ALPHA * (step.reward + GAMMA * highest - old);
+            let value = old + ALPHA * (step.reward + GAMMA * highest - old);
+            if !value.is_finite() {
+                return Err("a value is not finite".into());
+            }
+            table[state][action] = value;
+            visits[state][action] += 1;
             state = next;
         }
         Ok(())
     });
-    black_box(table[state][0]);
+    black_box((table[state][0], visits[state][0]));
     measured
 }

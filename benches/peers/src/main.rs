@@ -169,9 +169,19 @@ fn plain_boltzmann(updates: u64) -> Result<f64> {
     follow(updates, &mut policy)
 }
 
-#[inline(always)]
 fn follow<P: Policy>(updates: u64, policy: &mut P) -> Result<f64> {
-    let table = &mut QTable::new(STATES, ACTIONS)?;
+    follow_in(updates, policy, (STATES, ACTIONS), step)
+}
+
+/// A loop of choices and updates in a problem of a shape.
+#[inline(always)]
+fn follow_in<P: Policy>(
+    updates: u64,
+    policy: &mut P,
+    (states, actions): (usize, usize),
+    step: impl Fn(State, Action) -> Step,
+) -> Result<f64> {
+    let table = &mut QTable::new(states, actions)?;
     let mut learner = QLearning::new(Schedule::constant(ALPHA)?, GAMMA)?;
     let (mut rng, mut state) = (rng(1), State(0));
     let measured = rate(updates, || {
@@ -280,8 +290,14 @@ fn small_sarsa_lambda(updates: u64) -> Result<f64> {
     )
 }
 
-fn small_boltzmann(updates: u64) -> Result<f64> {
-    let policy = Boltzmann::new(Schedule::constant(TEMPERATURE)?)?;
+/// The loop of the softmax by hand.
+fn small_softmax(updates: u64, temperature: f64) -> Result<f64> {
+    let mut policy = Boltzmann::new(Schedule::constant(temperature)?)?;
+    follow_in(updates, &mut policy, (500, 4), small_step)
+}
+
+fn small_boltzmann(updates: u64, temperature: f64) -> Result<f64> {
+    let policy = Boltzmann::new(Schedule::constant(temperature)?)?;
     small_training(
         updates,
         QLearning::new(Schedule::constant(ALPHA)?, GAMMA)?,
@@ -353,7 +369,7 @@ fn main() -> Result<()> {
         .next()
         .map_or(Ok(4_000_000), |text| text.parse())?;
     type Entry = (&'static str, fn(u64) -> Result<f64>);
-    let entries: [Entry; 18] = [
+    let entries: [Entry; 21] = [
         ("rurel 0.6.0, random actions, f64", rurel),
         ("random actions, f64", |n| epsilon_greedy(n, 1.0)),
         ("epsilon-greedy 0.1, f64", |n| epsilon_greedy(n, 0.1)),
@@ -390,9 +406,14 @@ fn main() -> Result<()> {
             )
         }),
         ("500x4: run, SARSA(0.8)", |n| small_sarsa_lambda(n / 4)),
-        ("500x4: run, Boltzmann", |n| small_boltzmann(n / 2)),
-        ("500x4: softmax by hand, std exp", |n| {
-            softmax_by_hand(n / 2)
+        ("500x4: run, Boltzmann", |n| small_boltzmann(n / 2, 1.0)),
+        ("500x4: Boltzmann", |n| small_softmax(n / 2, 1.0)),
+        ("500x4: the same by hand, std exp", |n| {
+            softmax_by_hand(n / 2, 1.0)
+        }),
+        ("500x4: Boltzmann, T = 0.05", |n| small_softmax(n / 2, 0.05)),
+        ("500x4: the same by hand, T = 0.05", |n| {
+            softmax_by_hand(n / 2, 0.05)
         }),
     ];
     let word = arguments.next().unwrap_or_default();

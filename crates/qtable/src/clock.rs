@@ -37,10 +37,10 @@ impl Clock {
         }
     }
 
-    /// Counts an action.
+    /// Counts an action. Only a count from a file could wrap.
     #[inline(always)]
     pub(crate) fn tick(&mut self) {
-        self.actions = self.actions.saturating_add(1);
+        self.actions = self.actions.wrapping_add(1);
     }
 
     /// Counts an episode that begins.

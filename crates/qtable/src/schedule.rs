@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use crate::clock::{BLOCK, Clock};
+use crate::clock::{BLOCK, Block, Clock};
 use crate::elementary::{exp, ln};
 use crate::error::{Error, check_ascending, check_setting};
 use crate::validated::validated;
@@ -39,6 +39,9 @@ validated! {
     pub struct Schedule {
         shape: Shape,
         by_episode: bool,
+        /// The value of a constant schedule, so that it is found at once.
+        #[cfg_attr(feature = "serde", serde(skip))]
+        constant: Option<f64>,
         /// The logarithm of the ratio of an exponential schedule's ends.
         #[cfg_attr(feature = "serde", serde(skip))]
         log_ratio: f64,
@@ -196,23 +199,26 @@ impl Schedule {
         }
     }
 
-    /// Computes the values of a block of steps.
+    /// Computes the values of the block that a step belongs to. Returns that of the step.
     #[cold]
     #[inline(never)]
-    fn block(&self, first: u64, values: &mut Vec<f64>) {
-        let steps = (0..BLOCK).map(|step| first.saturating_add(step));
+    fn begin_block(&self, step: u64, clock: &mut Clock) -> f64 {
+        let Block { first, values } = &mut clock.block;
+        *first = step - step % BLOCK;
+        let first = *first;
         values.clear();
         match self.shape {
             Shape::Exponential(start, end, last) if first < last.saturating_sub(BLOCK) => {
-                let head = self.head(first);
-                let factors = self.factors.iter();
+                let (head, factors) = (self.head(first), self.factors.iter());
                 values.extend(factors.map(|factor| held_between(start, end, head * factor)));
             }
-            Shape::Linear(start, end, last) => {
-                values.extend(steps.map(|step| between(start, end, step, last)));
+            Shape::Linear(start, end, last) if first < last.saturating_sub(BLOCK).min(1 << 52) => {
+                let steps = (0..BLOCK as u32).map(|step| float(first) + f64::from(step));
+                values.extend(steps.map(|step| mixed(start, end, step / float(last))));
             }
-            _ => values.extend(steps.map(|step| self.at(step))),
+            _ => values.extend((0..BLOCK).map(|step| self.at(first.saturating_add(step)))),
         }
+        values[(step - first) as usize]
     }
 
     /// Returns values among which are the smallest and the largest.
@@ -256,20 +262,17 @@ impl Schedule {
     /// the block that the clock keeps.
     #[inline(always)]
     pub(crate) fn current(&self, clock: &mut Clock, visits: u32) -> f64 {
-        if let Shape::Constant(value) = self.shape {
+        if let Some(value) = self.constant {
             return value;
         }
-        if self.is_by_visits() {
-            return self.at(u64::from(visits));
-        }
         let time = clock.time(self.by_episode);
-        let block = &mut clock.block;
-        if let Some(value) = block.values.get(time.wrapping_sub(block.first) as usize) {
-            return *value;
+        let block = &clock.block;
+        match block.values.get(time.wrapping_sub(block.first) as usize) {
+            Some(value) => *value,
+            // A schedule by visits never has a block.
+            None if self.is_by_visits() => self.at(u64::from(visits)),
+            None => self.begin_block(time, clock),
         }
-        block.first = time - time % BLOCK;
-        self.block(block.first, &mut block.values);
-        block.values[(time - block.first) as usize]
     }
 
     /// Returns the value now of a quantity that belongs to no pair.
@@ -295,6 +298,7 @@ impl Schedule {
         Self {
             shape,
             by_episode: false,
+            constant: None,
             log_ratio: 0.0,
             factors: Vec::new(),
         }
@@ -330,7 +334,8 @@ impl Schedule {
                 let steps = points.iter().map(|&(step, _)| step as f64);
                 check_ascending("the step of point", steps)?;
             }
-            Shape::Constant(_) | Shape::Custom(_) => {}
+            Shape::Constant(value) => self.constant = Some(*value),
+            Shape::Custom(_) => {}
         }
         Ok(self)
     }
@@ -352,7 +357,12 @@ fn between(start: f64, end: f64, step: u64, steps: u64) -> f64 {
     if step >= steps {
         return end;
     }
-    let t = float(step) / float(steps);
+    mixed(start, end, float(step) / float(steps))
+}
+
+/// Returns the value a fraction of the way along a straight line.
+#[inline(always)]
+fn mixed(start: f64, end: f64, t: f64) -> f64 {
     held_between(start, end, start * (1.0 - t) + end * t)
 }
 

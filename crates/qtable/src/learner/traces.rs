@@ -159,12 +159,12 @@ struct Recent {
     head: usize,
     pairs: Vec<(State, Action)>,
     traces: Vec<f64>,
+    /// The factor by which all traces are still to be multiplied.
+    decay: Option<f64>,
     /// Shape of the table in which all pairs lie.
     shape: (usize, usize),
     /// Place of the last visit of each entry of the table; a hint, which may be outdated.
     places: Vec<u32>,
-    /// Values before an update, to take it back.
-    before: Vec<f64>,
 }
 
 impl PartialEq for Recent {
@@ -200,13 +200,15 @@ impl Recent {
             .iter()
             .zip(&self.traces[self.head..]);
         let live = places.filter(|(_, trace)| **trace > 0.0);
-        live.map(|(&(state, action), &trace)| (state, action, trace))
+        let decay = self.decay.unwrap_or(1.0);
+        live.map(move |(&(state, action), &trace)| (state, action, trace * decay))
     }
 
     fn clear(&mut self) {
         self.head = 0;
         self.pairs.clear();
         self.traces.clear();
+        self.decay = None;
     }
 
     /// Drops the places before the head, and notes the places of the others.
@@ -246,26 +248,20 @@ impl Recent {
 
     /// Moves every pair by `amount` times its trace: all of them, or none and an error.
     fn spread(&mut self, table: &mut QTable, amount: f64) -> Result<(), Error> {
-        let (pairs, traces) = (&self.pairs[self.head..], &self.traces[self.head..]);
-        self.before.resize(self.pairs.len(), 0.0);
-        let before = &mut self.before[..pairs.len()];
-        if table.add_to_all(pairs, traces, amount, before) {
-            return Ok(());
-        }
-        table.put_back(pairs, before);
-        let moved = pairs.iter().zip(traces).zip(before);
-        for ((&(state, action), trace), old) in moved {
-            check_finite("value", state, action, *old + amount * trace)?;
-        }
+        let (pairs, traces) = (&self.pairs[self.head..], &mut self.traces[self.head..]);
+        table.add_to_all(pairs, traces, self.decay.unwrap_or(1.0), amount)?;
+        self.decay = None;
         Ok(())
     }
 
-    /// Multiplies all traces and drops the smallest.
+    /// Multiplies all traces, when they are needed next, and drops the smallest.
     fn decay(&mut self, factor: f64) {
-        for trace in &mut self.traces[self.head..] {
-            *trace *= factor;
+        if let Some(before) = self.decay.replace(factor) {
+            for trace in &mut self.traces[self.head..] {
+                *trace *= before;
+            }
         }
-        let small = |trace: &&f64| **trace < SMALLEST_TRACE;
+        let small = |trace: &&f64| **trace * factor < SMALLEST_TRACE;
         self.head += self.traces[self.head..].iter().take_while(small).count();
     }
 }

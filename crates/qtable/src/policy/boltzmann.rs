@@ -1,9 +1,12 @@
 //! The Boltzmann policy.
 
+use std::f64::consts::LOG2_E;
+use std::ops::RangeInclusive;
+
 use rand::{Rng, RngExt};
 
 use crate::clock::Clock;
-use crate::elementary::exp_within;
+use crate::elementary::{PARTS, exp_within, exp2_quick};
 use crate::error::Error;
 use crate::policy::rule::Policy;
 use crate::schedule::Schedule;
@@ -27,6 +30,12 @@ validated! {
         weights: Scratch,
     }
 }
+
+/// Numbers of actions for which [`draw_of_few`] exists.
+const FEW: RangeInclusive<usize> = 2..=6;
+
+/// Factor from a number of temperatures to the unit of [`exp2_quick`].
+const SLOPE: f64 = LOG2_E * PARTS as f64;
 
 impl Boltzmann {
     /// Lowest temperature allowed.
@@ -71,6 +80,19 @@ impl Policy for Boltzmann {
     fn choose(&mut self, table: &QTable, state: State, rng: &mut dyn Rng) -> Action {
         let temperature = self.temperature.current(&mut self.clock, 0);
         self.clock.tick();
+        if FEW.contains(&table.actions()) && !table.is_restricted() {
+            let (highest, slope) = (table.max(state), SLOPE / temperature);
+            let uniform = rng.random();
+            let drawn = match *table.row(state) {
+                [a, b] => draw_of_few([a, b], highest, slope, uniform),
+                [a, b, c] => draw_of_few([a, b, c], highest, slope, uniform),
+                [a, b, c, d] => draw_of_few([a, b, c, d], highest, slope, uniform),
+                [a, b, c, d, e] => draw_of_few([a, b, c, d, e], highest, slope, uniform),
+                [a, b, c, d, e, f] => draw_of_few([a, b, c, d, e, f], highest, slope, uniform),
+                _ => None,
+            };
+            return drawn.map_or_else(|| table.best(state), Action);
+        }
         let weights = self.weights.of_length(table.actions());
         let sum = boltzmann_weights(table, state, temperature, weights);
         let mut rest = rng.random::<f64>() * sum;
@@ -95,6 +117,26 @@ impl Policy for Boltzmann {
     fn begin_episode(&mut self) {
         self.clock.begin_episode();
     }
+}
+
+/// Draws one of a few actions, which waits for one exponential and not for a loop of them. Returns
+/// `None` if rounding left a crumb after the last action.
+#[inline(always)]
+fn draw_of_few<const N: usize>(
+    row: [f64; N],
+    highest: f64,
+    slope: f64,
+    uniform: f64,
+) -> Option<usize> {
+    let mut ends = [0.0; N];
+    for (end, value) in ends.iter_mut().zip(row) {
+        *end = exp2_quick((value - highest) * slope);
+    }
+    for action in 1..N {
+        ends[action] += ends[action - 1];
+    }
+    let drawn = uniform * ends[N - 1];
+    ends.iter().position(|&end| drawn < end)
 }
 
 /// Writes `exp((Q - max Q) / T)` for each action (0 below `exp(-700)`), 0 for forbidden ones, and

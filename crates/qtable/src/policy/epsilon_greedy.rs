@@ -60,10 +60,20 @@ impl EpsilonGreedy {
             (false, Ties::Random) => table.equals(state),
             (false, Ties::Lowest) => 1,
         };
-        let mut wanted = table
-            .offered(state)
-            .filter(|&action| explores || is_best(table, state, action));
-        wanted.nth(part(bits, count)).unwrap_or(table.best(state))
+        // The row is read once, from the first candidate on.
+        let (row, lowest) = (table.row(state), table.best(state));
+        let (highest, first) = match explores {
+            true => (f64::NEG_INFINITY, 0),
+            false => (table.max(state), lowest.0),
+        };
+        let (candidates, nth) = (first..row.len(), part(bits, count));
+        let drawn = match table.mask_row(state) {
+            None => candidates.filter(|&a| row[a] >= highest).nth(nth),
+            Some(offered) => candidates
+                .filter(|&a| offered[a] && row[a] >= highest)
+                .nth(nth),
+        };
+        drawn.map_or(lowest, Action)
     }
 
     fn restore(self) -> Result<Self, Error> {
@@ -80,15 +90,13 @@ impl Policy for EpsilonGreedy {
         // One half of the bits decides whether to explore, the other one what is drawn.
         let drawn = rng.next_u64();
         let bits = drawn as u32;
-        if f64::from((drawn >> 32) as u32) * 2.0f64.powi(-32) < epsilon {
-            return match table.is_restricted() {
-                true => self.draw(table, state, bits, true),
-                false => Action(part(bits, table.actions())),
-            };
+        let explores = f64::from((drawn >> 32) as u32) * 2.0f64.powi(-32) < epsilon;
+        if explores && !table.is_restricted() {
+            return Action(part(bits, table.actions()));
         }
         match table.only_best(state) {
-            Some(best) => best,
-            None => self.draw(table, state, bits, false),
+            Some(best) if !explores => best,
+            _ => self.draw(table, state, bits, explores),
         }
     }
 

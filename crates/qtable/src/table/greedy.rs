@@ -88,6 +88,7 @@ impl QTable {
         visits: u32,
         value: impl FnOnce(f64, u32) -> f64,
     ) -> Result<(), Error> {
+        let offered = self.mask.is_none() || self.allows(state, action);
         let entry = state.0 * self.actions + action.0;
         let (cell, count) = (&mut self.values[entry], &mut self.visits[entry]);
         let best = &mut self.best[state.0];
@@ -95,69 +96,59 @@ impl QTable {
         check_finite("value", state, action, value)?;
         *cell = value;
         *count = count.saturating_add(visits);
-        let index = action.0 as u32;
-        // The best of a row that is up to date and offers any.
-        if index == best.action && best.equals.wrapping_sub(1) < OUTDATED - 1 {
-            best.value = value;
-            if value < old {
-                self.find_best(state);
-            } else if value > old {
-                best.equals = 1;
+        if best.equals == OUTDATED {
+            return Ok(());
+        }
+        if value > best.value {
+            if offered {
+                *best = Best::new(value, action.0 as u32, 1);
             }
-        } else if (old >= best.value || value >= best.value)
-            && best.equals != OUTDATED
-            && self.allows(state, action)
-        {
-            self.follow(state, index, old, value);
+        } else if (old >= best.value) != (value >= best.value) && offered {
+            self.follow(state, action, value < old);
         }
         Ok(())
     }
 
-    /// Keeps the best action after an offered action other than it went from `old` to `value`, one
-    /// of which reaches the highest value.
+    /// Keeps the best action after an offered action began or ceased to share the highest value.
     #[inline]
-    fn follow(&mut self, state: State, action: u32, old: f64, value: f64) {
-        let best = &mut self.best[state.0];
-        if value > best.value {
-            *best = Best::new(value, action, 1);
-            return;
-        }
-        let (was, is) = (old >= best.value, value >= best.value);
-        best.equals = best.equals + u32::from(is) - u32::from(was);
-        if is {
+    fn follow(&mut self, state: State, action: Action, falls: bool) {
+        let (best, action) = (&mut self.best[state.0], action.0 as u32);
+        if !falls {
+            best.equals += 1;
             best.action = best.action.min(action);
+        } else if best.equals > 1 && best.action != action {
+            best.equals -= 1;
+        } else {
+            self.find_best(state);
         }
     }
 
-    /// Adds `amount` times its factor to the value of each pair, all in the table, and writes the
-    /// values before into `before`. Returns `false` if a value is not finite now. The best actions
-    /// of these rows are outdated then, and searched when they are asked for.
+    /// Multiplies all factors, in `0..=1`, by `decay`, and adds `amount` times its factor to the
+    /// value of each pair, all in the table and each once but for factors of 0: all of them, or
+    /// none and an error if a value would not be finite. The best actions of these rows are
+    /// outdated then, and searched when they are asked for.
     pub(crate) fn add_to_all(
         &mut self,
         pairs: &[(State, Action)],
-        factors: &[f64],
+        factors: &mut [f64],
+        decay: f64,
         amount: f64,
-        before: &mut [f64],
-    ) -> bool {
-        // Stays 0 as long as all values are finite.
-        let mut sum = 0.0;
-        for ((&(state, action), factor), before) in pairs.iter().zip(factors).zip(before) {
-            let value = &mut self.values[state.0 * self.actions + action.0];
-            *before = *value;
-            *value += amount * factor;
-            sum += 0.0 * *value;
+    ) -> Result<(), Error> {
+        // Half a unit in the last place of the largest number: less cannot lead beyond it.
+        let harmless = amount.abs() < 2.0f64.powi(970);
+        if !harmless {
+            for (&(state, action), factor) in pairs.iter().zip(&*factors) {
+                let value = self.value(state, action) + amount * (factor * decay);
+                check_finite("value", state, action, value)?;
+            }
+        }
+        let actions = self.actions;
+        for (&(state, action), factor) in pairs.iter().zip(factors) {
+            *factor *= decay;
+            self.values[state.0 * actions + action.0] += amount * *factor;
             self.best[state.0].equals = OUTDATED;
         }
-        sum == 0.0
-    }
-
-    /// Writes values back that [`add_to_all`](QTable::add_to_all) has replaced.
-    #[cold]
-    pub(crate) fn put_back(&mut self, pairs: &[(State, Action)], before: &[f64]) {
-        for (&(state, action), &value) in pairs.iter().zip(before).rev() {
-            self.values[state.0 * self.actions + action.0] = value;
-            self.find_best(state);
-        }
+        Ok(())
     }
 
     /// Searches the best action of a row that is outdated.
@@ -174,7 +165,7 @@ impl QTable {
     }
 
     /// Searches the best action of a row.
-    #[inline(never)]
+    #[inline(always)]
     fn searched(&self, state: State) -> Best {
         let row = &self.values[state.0 * self.actions..][..self.actions];
         let higher = |a: f64, b: f64| if b > a { b } else { a };
@@ -254,9 +245,9 @@ mod tests {
                 match rng.random_range(0..3) {
                     0 => {
                         let amount = f64::from(rng.random_range(-2..=2));
-                        let finite =
-                            table.add_to_all(&several, &[1.0, 0.0, 2.0], amount, &mut [0.0; 3]);
-                        assert!(finite);
+                        table
+                            .add_to_all(&several, &mut [1.0, 0.0, 0.5], 0.5, amount)
+                            .unwrap();
                     }
                     1 => table.refresh(state),
                     _ if table.allows(state, action) => {
@@ -279,17 +270,28 @@ mod tests {
     }
 
     #[test]
-    fn values_that_are_not_finite_are_put_back() {
+    fn a_sum_that_is_not_finite_changes_nothing() {
         let mut table = QTable::filled(2, 2, 1e308).unwrap();
-        let pairs = [
-            (State(0), Action(1)),
-            (State(1), Action(0)),
-            (State(0), Action(1)),
-        ];
-        let (before, mut kept) = (table.clone(), [0.0; 3]);
-        assert!(!table.add_to_all(&pairs, &[1e-9, 1.0, 1.0], 1e308, &mut kept));
-        table.put_back(&pairs, &kept);
+        let pairs = [(State(0), Action(1)), (State(1), Action(0))];
+        let before = table.clone();
+        assert!(
+            table
+                .add_to_all(&pairs, &mut [1e-9, 1.0], 1.0, 1e308)
+                .is_err()
+        );
+        assert!(
+            table
+                .add_to_all(&pairs, &mut [1e-9, 1.0], 1.0, f64::NAN)
+                .is_err()
+        );
         assert_eq!(table.values, before.values);
         assert_eq!(table.greedy(), before.greedy());
+        let largest = QTable::filled(2, 2, f64::MAX).unwrap();
+        let mut table = largest.clone();
+        let amount = 2.0f64.powi(970).next_down();
+        table
+            .add_to_all(&pairs, &mut [1.0; 2], 1.0, amount)
+            .unwrap();
+        assert_eq!(table.values, largest.values);
     }
 }
