@@ -1,6 +1,7 @@
 //! Start, output and end of the programs.
 
 use std::error::Error;
+use std::io::Write as _;
 pub use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock, Mutex};
@@ -20,16 +21,14 @@ const STOPPED: u8 = 130;
 /// Reason of a run that a signal has stopped.
 const BY_SIGNAL: &str = "stopped by a signal";
 
-/// Flag that the first SIGINT (Ctrl-C) or SIGTERM sets.
+/// Flag that the first SIGINT (Ctrl-C), SIGTERM or SIGHUP (a terminal that closes) sets.
 pub static STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
 /// Runs a program with the options of its command line, and returns its exit code after printing
-/// the error if there is one. A first SIGINT or SIGTERM sets [`STOP`], a second one ends the
-/// program at once.
-#[allow(clippy::print_stderr, reason = "the error of a program")]
+/// the error if there is one. A first signal sets [`STOP`], a second one ends the program at once.
 pub fn start<O: Parser>(run: impl FnOnce(&O) -> Outcome) -> ExitCode {
     let options = O::parse();
-    for signal in [SIGINT, SIGTERM] {
+    for signal in signals() {
         // Without them a signal ends the program, as it does by default.
         let _ = flag::register_conditional_shutdown(signal, STOPPED.into(), Arc::clone(&STOP));
         let _ = flag::register(signal, Arc::clone(&STOP));
@@ -43,10 +42,27 @@ pub fn start<O: Parser>(run: impl FnOnce(&O) -> Outcome) -> ExitCode {
                 true => format!("{BY_SIGNAL}: {words}"),
                 false => words,
             };
-            eprintln!("error: {reason}");
+            // The terminal may be gone.
+            let _ = writeln!(std::io::stderr(), "error: {reason}");
             ExitCode::from(if stopped() { STOPPED } else { 1 })
         }
     }
+}
+
+/// Signals that stop the program. A program that was started to outlive its terminal, as by
+/// `nohup`, ignores the last.
+fn signals() -> Vec<i32> {
+    let mut signals = vec![SIGINT, SIGTERM];
+    #[cfg(unix)]
+    {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+        let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+        if ignored.is_none_or(|mask| mask & 1 == 0) {
+            signals.push(signal_hook::consts::SIGHUP);
+        }
+    }
+    signals
 }
 
 /// Returns whether the program is to stop.

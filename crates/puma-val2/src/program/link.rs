@@ -7,6 +7,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use signal_hook::consts::{SIGINT, SIGTERM};
+
 use crate::client::{ClientConfig, MoveWay, Val2Client};
 use crate::emulator::profile::Profile;
 use crate::kinematics::params::PumaParams;
@@ -14,7 +16,11 @@ use crate::program::failure::Failure;
 use crate::program::{Command, Globals, commands, term};
 use crate::transport::{Recorded, SerialLine, TcpLine, Transport};
 
-/// A line that Ctrl-C interrupts: it fails once, so that what has been begun can still be cleared
+/// What is said where a stop cannot reach the controller.
+const UNHEARD: &str = "the arm may be moving: press the emergency stop on the panel";
+const INTERRUPTED: &str = "interrupted by a signal";
+
+/// A line that a signal interrupts: it fails once, so that what has been begun can still be cleared
 /// away.
 pub(super) struct Link {
     line: Box<dyn Transport>,
@@ -23,13 +29,13 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// Returns `true` if Ctrl-C has come.
+    /// Returns `true` if a signal has come.
     #[cfg(unix)]
     pub(super) fn is_interrupted(&self) -> bool {
         self.interrupted.load(Ordering::Acquire) || self.failed.get()
     }
 
-    /// Returns `true` once for each Ctrl-C.
+    /// Returns `true` once for each signal.
     pub(super) fn take_interrupt(&self) -> bool {
         self.interrupted.swap(false, Ordering::AcqRel) | self.failed.replace(false)
     }
@@ -45,7 +51,7 @@ impl Transport for Link {
         loop {
             if self.interrupted.swap(false, Ordering::AcqRel) {
                 self.failed.set(true);
-                return Err(io::Error::other("interrupted by Ctrl-C"));
+                return Err(io::Error::other(INTERRUPTED));
             }
             let left = until.saturating_sub(self.clock());
             let slice = left.min(Duration::from_millis(50));
@@ -69,7 +75,23 @@ impl Transport for Link {
 pub(super) fn with_line(globals: &Globals, command: &Command) -> Result<(), Failure> {
     commands::check(globals, command)?;
     let config = config(globals)?;
-    let mut link = open(globals)?;
+    let mut link = open(globals).map_err(|failure| match command {
+        Command::Stop => Failure {
+            text: format!("{}; {UNHEARD}", failure.text),
+            code: 6,
+        },
+        _ => failure,
+    })?;
+    let interrupted = |signal| signal_hook::flag::register(signal, Arc::clone(&link.interrupted));
+    interrupted(SIGINT)?;
+    // A terminal ends by the others at once; a Ctrl-C there is for the controller.
+    if !matches!(command, Command::Term) {
+        interrupted(SIGTERM)?;
+        #[cfg(unix)]
+        if !ignores_hangup() {
+            interrupted(signal_hook::consts::SIGHUP)?;
+        }
+    }
     let outcome = match command {
         Command::Stop => {
             Val2Client::stop_on(&mut link, config.clone())?;
@@ -81,7 +103,7 @@ pub(super) fn with_line(globals: &Globals, command: &Command) -> Result<(), Fail
     if outcome.is_ok() || !link.take_interrupt() {
         return outcome;
     }
-    let mut text = "interrupted by Ctrl-C".to_owned();
+    let mut text = INTERRUPTED.to_owned();
     if command.moves() {
         match Val2Client::stop_on(&mut link, config) {
             Ok(()) => text.push_str("; the arm has been stopped"),
@@ -89,6 +111,15 @@ pub(super) fn with_line(globals: &Globals, command: &Command) -> Result<(), Fail
         }
     }
     Err(Failure { text, code: 130 })
+}
+
+/// Returns `true` if the program was started to outlive its terminal, as by `nohup`.
+#[cfg(unix)]
+fn ignores_hangup() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    ignored.is_some_and(|mask| mask & 1 != 0)
 }
 
 fn config(globals: &Globals) -> Result<ClientConfig, Failure> {
@@ -114,8 +145,6 @@ fn config(globals: &Globals) -> Result<ClientConfig, Failure> {
 }
 
 fn open(globals: &Globals) -> Result<Link, Failure> {
-    let interrupted = Arc::new(AtomicBool::new(false));
-    signal_hook::flag::register(signal_hook::consts::SIGINT, Arc::clone(&interrupted))?;
     let variable = std::env::var("VAL2_PORT")
         .ok()
         .filter(|port| !port.is_empty());
@@ -138,7 +167,7 @@ fn open(globals: &Globals) -> Result<Link, Failure> {
     }
     Ok(Link {
         line,
-        interrupted,
+        interrupted: Arc::default(),
         failed: Cell::new(false),
     })
 }

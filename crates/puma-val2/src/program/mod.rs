@@ -20,11 +20,12 @@ use crate::program::failure::Failure;
 
 const EXIT_CODES: &str = "\
 The controller is named by --port or --tcp, or by the variable VAL2_PORT. Commands that move the arm
-ask first, unless --yes, and set the monitor's speed to 10 %, unless --speed. Ctrl-C stops a motion.
+ask first, unless --yes, and set the monitor's speed to 10 %, unless --speed. A motion is stopped by
+Ctrl-C, by SIGTERM, and by a terminal that closes (SIGHUP, unless the program runs by nohup).
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 refused by the controller, 4 the line failed or no
 VAL monitor answers, 5 not confirmed, 6 the arm may be moving: press the emergency stop,
-130 Ctrl-C.";
+130 stopped by a signal.";
 
 /// Drives PUMA robots with a VAL II controller, keeps their programs, and emulates one.
 #[derive(Debug, Parser)]

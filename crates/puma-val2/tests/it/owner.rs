@@ -284,7 +284,7 @@ fn stop_reaches_an_arm_whose_program_was_killed() {
         bench.says(&["--profile", profile, "--yes", "calibrate"]);
         let mut child = bench.moving();
         let begun = Instant::now();
-        let held = bench.fails(4, &["--profile", profile, "stop"]);
+        let held = bench.fails(6, &["--profile", profile, "stop"]);
         assert!(held.contains("`val2` (process"), "{held}");
         child.kill().unwrap();
         child.wait().unwrap();
