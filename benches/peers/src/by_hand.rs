@@ -41,22 +41,32 @@ pub fn by_hand(updates: u64) -> Result<f64> {
 }
 
 /// The loop by hand that does what the table does: it counts visits, draws among equally good
-/// actions, and stops at a value that is not finite.
-pub fn by_hand_alike(updates: u64) -> Result<f64> {
-    let mut table = vec![[0.0f64; ACTIONS]; STATES];
-    let mut visits = vec![[0u32; ACTIONS]; STATES];
+/// actions, and stops at a value that is not finite. An episode begins every `limit` steps.
+#[inline(always)]
+pub fn by_hand_alike<const S: usize, const A: usize>(
+    updates: u64,
+    limit: u64,
+    epsilon: impl Fn(u64) -> f64,
+    transition: impl Fn(usize, usize) -> (usize, f64),
+) -> Result<f64> {
+    let mut table = vec![[0.0f64; A]; S];
+    let mut visits = vec![[0u32; A]; S];
     // Highest value, its first action, and how many share it.
-    let mut best = [(0.0, 0usize, ACTIONS); STATES];
-    let (mut rng, mut state) = (rng(1), 0);
+    let mut best = [(0.0, 0usize, A); S];
+    let (mut rng, mut state, mut left) = (rng(1), 0, limit);
     let measured = rate(updates, || {
-        for _ in 0..updates {
+        for update in 0..updates {
+            if left == 0 {
+                (state, left) = (rng.random_range(0..S), limit);
+            }
+            left -= 1;
             let (highest, first, equals) = best[state];
-            let action = match rng.random::<f64>() < 0.1 {
-                true => rng.random_range(0..ACTIONS),
+            let action = match rng.random::<f64>() < epsilon(update) {
+                true => rng.random_range(0..A),
                 false if equals == 1 => first,
                 false => {
                     let drawn = rng.random_range(0..equals);
-                    let mut ties = (0..ACTIONS).filter(|&action| table[state][action] >= highest);
+                    let mut ties = (0..A).filter(|&action| table[state][action] >= highest);
                     ties.nth(drawn).unwrap_or(first)
                 }
             };

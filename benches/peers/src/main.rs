@@ -234,12 +234,17 @@ fn cached<const LEARNERS: usize>(updates: u64, seed: u64) -> Result<f64> {
     measured
 }
 
-/// The step of a problem of 500 states and 4 actions.
+/// Next state and reward of a problem of 500 states and 4 actions.
+#[inline(always)]
+fn small_transition(state: usize, action: usize) -> (usize, f64) {
+    let mixed = (state * 4 + action).wrapping_mul(2_654_435_761) >> 7;
+    (mixed % 500, if mixed & 63 == 0 { 1.0 } else { 0.0 })
+}
+
 #[inline(always)]
 fn small_step(state: State, action: Action) -> Step {
-    let mixed = (state.0 * 4 + action.0).wrapping_mul(2_654_435_761) >> 7;
-    let reward = if mixed & 63 == 0 { 1.0 } else { 0.0 };
-    Step::new(State(mixed % 500), reward, Status::Continuing)
+    let (next, reward) = small_transition(state.0, action.0);
+    Step::new(State(next), reward, Status::Continuing)
 }
 
 /// Environment of this problem for `qtable`.
@@ -369,11 +374,13 @@ fn main() -> Result<()> {
         .next()
         .map_or(Ok(4_000_000), |text| text.parse())?;
     type Entry = (&'static str, fn(u64) -> Result<f64>);
-    let entries: [Entry; 21] = [
+    let entries: [Entry; 23] = [
         ("rurel 0.6.0, random actions, f64", rurel),
         ("random actions, f64", |n| epsilon_greedy(n, 1.0)),
         ("epsilon-greedy 0.1, f64", |n| epsilon_greedy(n, 0.1)),
-        ("the same by hand", by_hand_alike),
+        ("the same by hand", |n| {
+            by_hand_alike::<STATES, ACTIONS>(n, u64::MAX, |_| 0.1, transition)
+        }),
         ("the same by hand, least work", by_hand),
         ("Boltzmann, plain, f64", |n| plain_boltzmann(n / 8)),
         ("Boltzmann, cached, f32", |n| cached::<1>(n, 1)),
@@ -396,6 +403,18 @@ fn main() -> Result<()> {
                 n,
                 Schedule::constant(ALPHA)?,
                 Schedule::linear(1.0, 0.1, n)?,
+            )
+        }),
+        ("500x4: constant eps by hand", |n| {
+            by_hand_alike::<500, 4>(n, 60, |_| 0.1, small_transition)
+        }),
+        ("500x4: linear eps by hand", |n| {
+            let by_step = 0.9 / n as f64;
+            by_hand_alike::<500, 4>(
+                n,
+                60,
+                |update| 1.0 - by_step * update as f64,
+                small_transition,
             )
         }),
         ("500x4: run, both exponential", |n| {
