@@ -106,7 +106,7 @@ pub enum Error {
     #[error("no convergence after {0} sweeps: the last one still changed a value by {1}")]
     NotConverged(u64, f64),
     /// A letter without meaning in the map of a frozen lake, its row and its column, from 0.
-    #[error("row {1}, column {2} of the map is {0:?}: it must be S, F, H or G")]
+    #[error("row {1}, column {2} of the map is {0:?}: give 4x4, 8x8, or rows of S, F, H and G")]
     MapLetter(char, usize, usize),
     /// A line of a CSV text that is no part of a table: its number, counted from 1, the problem,
     /// and what is expected instead.

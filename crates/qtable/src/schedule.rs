@@ -61,8 +61,19 @@ enum Shape {
     InverseVisits(f64, f64),
     VisitsPower(f64, f64),
     Piecewise(Vec<(u64, f64)>),
-    #[cfg_attr(feature = "serde", serde(skip))]
+    #[cfg_attr(
+        feature = "serde",
+        serde(skip_deserializing, serialize_with = "refuse")
+    )]
     Custom(Custom),
+}
+
+/// Refuses to serialize a function.
+#[cfg(feature = "serde")]
+fn refuse<S: serde::Serializer>(_: &Custom, _: S) -> Result<S::Ok, S::Error> {
+    let problem = "a schedule by a function of yours cannot be saved: use another one, or save \
+                   table and learner without it";
+    Err(serde::ser::Error::custom(problem))
 }
 
 /// A function of the caller and its range.

@@ -48,7 +48,8 @@ pub trait Environment {
     }
 
     /// Returns the player who acts next, 0 or 1, in a game for two
-    /// ([`Training::run_against`](crate::Training::run_against)). By default always 0.
+    /// ([`Training::run_against`](crate::Training::run_against)). By default always 0. All other
+    /// drivers take no notice: one learner acts for both, and all rewards are its own.
     fn player(&self) -> usize {
         0
     }

@@ -48,10 +48,7 @@ fn what_is_saved_is_loaded() {
     assert_eq!(decode::<(Product, Schedule)>("x", &bytes).unwrap(), both);
     let custom = Schedule::custom((0.0, 1.0), |_| 0.5).unwrap();
     let refused = encode("x", &custom).unwrap_err().to_string();
-    assert!(
-        refused.ends_with("Shape::Custom cannot be serialized"),
-        "{refused}"
-    );
+    assert!(refused.contains("a function of yours cannot"), "{refused}");
 }
 
 #[cfg(unix)]

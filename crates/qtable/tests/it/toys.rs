@@ -162,6 +162,8 @@ fn impossible_toys_are_refused() {
     assert_refused!(lake("FG"), Error::Setting { .. });
     assert_refused!(lake("SF\nXG"), Error::MapLetter('X', 1, 0));
     assert_refused!(lake("Sé G"), Error::MapLetter('é', ..));
+    let text = lake("16x16").unwrap_err().to_string();
+    assert!(text.contains("give 4x4, 8x8"), "{text}");
     assert_refused!(ModelEnvironment::chain(1), Error::Setting { .. });
     assert_eq!(taxi().states(), 500);
 }
