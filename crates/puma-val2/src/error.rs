@@ -182,8 +182,8 @@ pub enum ArmError {
         /// Joint angles at which the arm stands.
         joints: Joints,
     },
-    /// A backup does not say what it should. Nothing was changed.
-    #[error("line {line} of the backup {problem}: {text}")]
+    /// A text of programs, locations and reals does not say what it should. Nothing was changed.
+    #[error("line {line} of the text {problem}: {text}")]
     Text {
         /// Number of the line, from 1.
         line: usize,
@@ -193,7 +193,7 @@ pub enum ArmError {
         problem: &'static str,
     },
     /// A controller holds other contents under names of a backup. Nothing was changed.
-    #[error("{port}: the controller holds other contents of {names}: nothing was restored")]
+    #[error("{port}: the controller holds other contents of {names}: nothing was stored")]
     Conflict {
         /// The line.
         port: String,

@@ -334,9 +334,12 @@ impl Contents {
             if upper == ".END" && !section.is_empty() {
                 section.clear();
             } else if section == ".PROGRAM" {
-                if let Some((_, body)) = contents.programs.last_mut()
-                    && !line.is_empty()
-                {
+                let body = contents.programs.last_mut().map(|(_, body)| body);
+                let Some(body) = body else { continue };
+                // A listing counts the steps.
+                let number = format!("{}.", body.steps.len() + 1);
+                let line = line.strip_prefix(&number).map_or(line, str::trim_start);
+                if !line.is_empty() {
                     check_line("a step of a program", line).map_err(|_| wrong("is no step"))?;
                     body.steps.push(line.to_owned());
                     body.lines.push(index + 1);

@@ -405,5 +405,9 @@ fn in_file(file: &Path, error: ArmError) -> Failure {
 }
 
 fn show_plan(globals: &Globals, plan: &[String]) -> Result<(), Failure> {
-    print(globals, &plan.join("\n"), &json!({ "plan": plan }))
+    let text = match plan {
+        [] => "the file holds nothing".to_owned(),
+        plan => plan.join("\n"),
+    };
+    print(globals, &text, &json!({ "plan": plan }))
 }

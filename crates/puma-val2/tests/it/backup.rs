@@ -289,6 +289,20 @@ fn a_refused_step_leaves_everything_as_it_was() {
 }
 
 #[test]
+fn a_listing_with_numbered_steps_is_stored_as_its_steps() {
+    let mut client = client(Profile::val2(), "");
+    let steps = "  1.  10 APPRO PART,50\n   2.  MOVES PART\n  3. TYPE \"1. done\"\n";
+    let text = format!(".PROGRAM PICK\n{steps}.END\n");
+    client.restore(&text, false).unwrap();
+    let stored = client.program("PICK").unwrap();
+    let trimmed: Vec<&str> = stored.iter().map(|step| step.trim()).collect();
+    assert_eq!(
+        trimmed,
+        ["10 APPRO PART,50", "MOVES PART", "TYPE \"1. done\""]
+    );
+}
+
+#[test]
 fn a_text_that_is_no_backup_is_refused_by_its_line() {
     let mut client = client(Profile::val2(), "");
     let sent = client.line().traffic();
