@@ -19,7 +19,7 @@ const SMALL: f32 = 9.0;
 const NOISY: f32 = 8.0;
 
 /// Least radius of a circle that is examined a second time at half the size, pixels there.
-const LEAST_SECOND: f32 = 8.0;
+const LEAST_SECOND: f32 = 4.0;
 /// Certainty from which no larger size is examined, except in noise.
 const SURE: f32 = 12.0;
 /// Reach of the search for edges in the narrow window, for a doubtful circle, radii.
