@@ -119,6 +119,16 @@ impl Prover<'_> {
                 SECOND_LOOK,
             );
         }
+        // A thin line is one in a larger size only.
+        if finest > 0
+            && self.noise <= NOISY
+            && candidate.weight >= LEAST_WEIGHT
+            && best.is_none_or(|first| !first.is_beyond_doubt())
+        {
+            let narrow = Some(Narrow::Within(NARROW * candidate.r));
+            let finer = self.prove_at(finest - 1, &candidate.ring(), narrow, looks);
+            best = Proof::better(best, finer, SECOND_LOOK);
+        }
         // A second outline close by may have the stronger edges.
         let certainty = best.map_or(f32::NEG_INFINITY, |proof| proof.certainty);
         if best.is_none_or(|proof| !proof.is_beyond_doubt())

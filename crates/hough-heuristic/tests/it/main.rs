@@ -9,6 +9,7 @@ mod a_contrario;
 mod a_contrario_score;
 mod any_frame;
 mod choice;
+mod colours;
 mod curves;
 mod detectors;
 mod ellipses;
