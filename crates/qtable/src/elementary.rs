@@ -68,40 +68,41 @@ pub(crate) const fn exp_within(x: f64) -> f64 {
 pub(crate) const PARTS: usize = 1 << PART_BITS;
 const PART_BITS: u32 = 7;
 
-/// Returns `2^(x / PARTS)` to a part in 10^8, as much as an `f32` holds, without a branch: 0 below
-/// `2^-1022`, any number above `2^1023`.
+/// Natural logarithm of a part of an octave.
+const STEP: f64 = LN_2 / PARTS as f64;
+
+/// Returns the rest of `x`, at most 1/2, beyond the nearest whole number k, and `2^(k / PARTS)`,
+/// without a branch: below `2^-1022` that, any number above `2^1023`.
 #[inline(always)]
-pub(crate) fn exp2_parts(x: f64) -> f32 {
+fn part_of_octave(x: f64) -> (f64, f64) {
     const LEAST: f64 = -1022.0 * PARTS as f64;
-    const STEP: f64 = LN_2 / PARTS as f64;
     let x = if x > LEAST { x } else { LEAST };
     let shifted = x + ROUND;
-    let (r, k) = (x - (shifted - ROUND), shifted.to_bits());
-    let power = f64::from_bits(POWERS[k as usize % PARTS].wrapping_add(k << (52 - PART_BITS)));
-    // On |r| <= 1/2 the first term left out is below 4e-9.
+    let k = shifted.to_bits();
+    let power = POWERS[k as usize % PARTS].wrapping_add(k << (52 - PART_BITS));
+    (x - (shifted - ROUND), f64::from_bits(power))
+}
+
+/// Returns `2^(x / PARTS)` to a part in 10^8, as much as an `f32` holds: 0 below `2^-1022`.
+#[inline(always)]
+pub(crate) fn exp2_parts(x: f64) -> f32 {
+    let (r, power) = part_of_octave(x);
+    // The first term left out is below 4e-9.
     ((1.0 + r * STEP + (r * r) * (STEP * STEP / 2.0)) * power) as f32
 }
 
-/// Returns `2^(x / PARTS)` to 3 units in the last place for `x` up to 0, below `2^-1022` that:
-/// sooner than [`exp_within`], but not in vectors.
+/// Returns `2^(x / PARTS)` to 3 units in the last place: sooner than [`exp_within`], but not in
+/// vectors.
 #[inline(always)]
 pub(crate) fn exp2_quick(x: f64) -> f64 {
-    const LEAST: f64 = -1022.0 * PARTS as f64;
-    const STEP: f64 = LN_2 / PARTS as f64;
-    const C: [f64; 4] = [
-        STEP * STEP / 2.0,
-        STEP * STEP * STEP / 6.0,
-        STEP * STEP * STEP * STEP / 24.0,
-        STEP * STEP * STEP * STEP * STEP / 120.0,
-    ];
-    let x = if x > LEAST { x } else { LEAST };
-    let shifted = x + ROUND;
-    let (r, k) = (x - (shifted - ROUND), shifted.to_bits());
-    let power = f64::from_bits(POWERS[k as usize % PARTS].wrapping_add(k << (52 - PART_BITS)));
-    // On |r| <= 1/2 the first term left out is below 6e-19.
+    const C2: f64 = STEP * STEP / 2.0;
+    const C3: f64 = C2 * STEP / 3.0;
+    const C4: f64 = C3 * STEP / 4.0;
+    const C5: f64 = C4 * STEP / 5.0;
+    let (r, power) = part_of_octave(x);
+    // The first term left out is below 6e-19.
     let r2 = r * r;
-    let series = r * STEP + r2 * ((C[0] + r * C[1]) + r2 * (C[2] + r * C[3]));
-    power + power * series
+    power + power * (r * STEP + r2 * ((C2 + r * C3) + r2 * (C4 + r * C5)))
 }
 
 /// The bits of `2^(k / PARTS)` less those of k, which in [`exp2_parts`] come with the exponent.

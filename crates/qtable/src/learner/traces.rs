@@ -127,7 +127,8 @@ impl Learner for Traces {
         }
         let old = table.value(state, action);
         let error = target - old;
-        let alpha = self.rates.alpha(table, state, action);
+        let visits = table.visits(state, action);
+        let alpha = self.rates.alpha.current(&mut self.rates.clock, visits);
         check_finite("value", state, action, old + alpha * error)?;
         let entry = table.entry(state, action)?;
         if self.recent.shape != table.shape() || self.recent.head > Recent::SPARE {

@@ -1,6 +1,6 @@
 //! The trait of a policy, the greedy policy, and the rule for ties.
 
-use rand::{Rng, RngExt};
+use rand::Rng;
 
 use crate::step::{Action, State};
 use crate::table::QTable;
@@ -92,22 +92,4 @@ pub enum Ties {
     /// The action with the lowest index. A table of equal values then leads to one and the same
     /// action again and again: FrozenLake is not learned from a table of zeros at ε = 0.1.
     Lowest,
-}
-
-impl Ties {
-    /// Returns one of the `equals` actions of `best`, of which `lowest` is the first. The generator
-    /// is asked only if there are several.
-    #[inline(always)]
-    pub(super) fn pick<I: Iterator<Item = Action>>(
-        self,
-        lowest: Action,
-        equals: usize,
-        rng: &mut dyn Rng,
-        best: impl FnOnce() -> I,
-    ) -> Action {
-        if self == Self::Lowest || equals < 2 {
-            return lowest;
-        }
-        best().nth(rng.random_range(0..equals)).unwrap_or(lowest)
-    }
 }

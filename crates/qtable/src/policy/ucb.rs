@@ -1,6 +1,6 @@
 //! Upper confidence bounds.
 
-use rand::Rng;
+use rand::{Rng, RngExt};
 
 use crate::elementary::ln;
 use crate::error::{Error, check_not_negative};
@@ -72,8 +72,12 @@ impl Policy for Ucb {
         let mut best = self.best(table, state);
         let lowest = best.next().unwrap_or_else(|| table.best(state));
         let equals = best.count() + 1;
-        self.ties
-            .pick(lowest, equals, rng, || self.best(table, state))
+        // The generator is asked only if there are several.
+        if self.ties == Ties::Lowest || equals < 2 {
+            return lowest;
+        }
+        let mut best = self.best(table, state);
+        best.nth(rng.random_range(0..equals)).unwrap_or(lowest)
     }
 
     fn probabilities(&self, table: &QTable, state: State, probabilities: &mut [f64]) -> bool {
