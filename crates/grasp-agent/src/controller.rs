@@ -149,8 +149,17 @@ pub enum GaveUp {
     /// [`AgentConfig::max_views`](crate::AgentConfig::max_views) of them.
     NotFound,
     /// The goal was not reached within
-    /// [`AgentConfig::max_cycles`](crate::AgentConfig::max_cycles) moves.
+    /// [`AgentConfig::max_cycles`](crate::AgentConfig::max_cycles) moves, for none of the reasons
+    /// below.
     OutOfCycles,
+    /// The moves ran out, and the ball left the view again and again.
+    KeptLosing,
+    /// The moves ran out, and the jaws closed beside the ball again and again.
+    KeptMissing,
+    /// The moves ran out, and two looks from one pose differed again and again.
+    Unsteady,
+    /// The moves ran out, and the ball had long kept its place in the image, away from the goal.
+    NoProgress,
     /// Every move that the controller could make leads out of the working limits, or the grip or
     /// the lift does.
     NoMoveLeft,
@@ -167,6 +176,10 @@ impl std::fmt::Display for GaveUp {
         f.write_str(match self {
             Self::NotFound => "the ball is in view from no search pose",
             Self::OutOfCycles => "the goal was not reached within the allowed number of moves",
+            Self::KeptLosing => "the ball left the view again and again until the moves ran out",
+            Self::KeptMissing => "the jaws closed beside the ball until the moves ran out",
+            Self::Unsteady => "looks from one pose differed until the moves ran out",
+            Self::NoProgress => "the ball came no nearer to the goal until the moves ran out",
             Self::NoMoveLeft => "every move leads out of the working limits",
             Self::Obstructed => {
                 "something was too near to the hand on the way to every search pose, to the ball, \

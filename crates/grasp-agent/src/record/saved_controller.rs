@@ -4,6 +4,7 @@ use crate::controller::{Controller, SavedController};
 use crate::controllers::hybrid::belief::Belief;
 use crate::controllers::hybrid::controller::Hybrid;
 use crate::controllers::hybrid::evidence::Evidence;
+use crate::controllers::hybrid::misfit::Misfit;
 use crate::controllers::hybrid::settings::HybridSettings;
 use crate::controllers::learned::{Learned, OnlineLearning};
 use crate::controllers::servo::controller::{Servo, ServoLaw};
@@ -14,7 +15,12 @@ use crate::error::BehaviourError;
 /// Data of a learned controller: behaviours, learning at work with its draws, and a taught goal.
 type LearnedData = (Learned, Option<(OnlineLearning, u64)>, Option<TaughtGoal>);
 /// Data of a hybrid: settings, belief, marks, the run before and the number of runs that fitted.
-type HybridData = (HybridSettings, Belief, [bool; 2], (Evidence, usize));
+type HybridData = (
+    HybridSettings,
+    Belief,
+    [bool; 2],
+    (Evidence, usize, Vec<Misfit>),
+);
 
 impl SavedController {
     /// Makes the controller again; a hybrid comes back frozen, as it decides within a run by what

@@ -152,7 +152,7 @@ impl SavedRun {
     }
 }
 
-const FORMAT: &str = "grasp-agent run 6";
+const FORMAT: &str = "grasp-agent run 7";
 
 #[derive(Debug, Deserialize)]
 struct Head {

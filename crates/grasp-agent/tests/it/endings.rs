@@ -140,7 +140,7 @@ fn a_circle_that_keeps_its_place_in_the_image_is_no_grasp() {
         ("once", once_before),
     ] {
         let (end, log) = run(agent(12), false, finds);
-        assert_eq!(end.unwrap().gave_up, Some(GaveUp::OutOfCycles), "{name}");
+        assert_eq!(end.unwrap().gave_up, Some(GaveUp::KeptMissing), "{name}");
         let searches = log.events.iter().filter(|e| e.kind == EventKind::Searching);
         assert_eq!(searches.count() > 1, name == "once", "{name}");
     }
@@ -155,11 +155,11 @@ fn a_recovery_that_offers_nothing_ends_with_the_cycles() {
     let outcome = end.unwrap();
     assert_eq!(
         (outcome.gave_up, outcome.cycles),
-        (Some(GaveUp::OutOfCycles), 60)
+        (Some(GaveUp::KeptLosing), 60)
     );
     // At the goal, gripped, and missed each time.
     let (end, log) = run(agent(1).recovering_by(once(None)), false, |_| Some(AT_GOAL));
-    assert_eq!(end.unwrap().gave_up, Some(GaveUp::OutOfCycles));
+    assert_eq!(end.unwrap().gave_up, Some(GaveUp::KeptMissing));
     assert!(log.events.iter().any(|e| e.kind == EventKind::Missed));
 }
 
@@ -240,7 +240,7 @@ fn an_endless_search_ends_after_so_many_viewpoints() {
     let outcome = end.unwrap();
     assert_eq!(
         (outcome.gave_up, outcome.cycles),
-        (Some(GaveUp::OutOfCycles), 60)
+        (Some(GaveUp::KeptLosing), 60)
     );
     assert!(views(&log) <= 20 * 61, "{}", views(&log));
 }

@@ -91,7 +91,7 @@ fn a_ball_that_is_not_gripped_is_reached_for_again() {
         .filter(|event| event.kind == EventKind::Missed)
         .count();
     assert!(
-        missed > 1 && outcome.gave_up == Some(GaveUp::OutOfCycles),
+        missed > 1 && outcome.gave_up == Some(GaveUp::KeptMissing),
         "{missed} {outcome:?}"
     );
     assert!(!cell.0.borrow().closed);
@@ -133,7 +133,7 @@ fn a_ball_at_two_places_in_turn_ends_with_the_cycles() {
     );
     let mut agent = Agent::with_controller(wide, servo()).unwrap();
     let outcome = cell.run(&mut agent, &mut EventLog::default()).unwrap();
-    assert_eq!(outcome.gave_up, Some(GaveUp::OutOfCycles));
+    assert_eq!(outcome.gave_up, Some(GaveUp::Unsteady));
     assert!(!cell.0.borrow().closed);
 }
 

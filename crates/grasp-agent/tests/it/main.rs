@@ -5,6 +5,7 @@
 mod arms;
 mod calibration;
 mod cell;
+mod conditions;
 mod endings;
 mod faults;
 mod gripping;
@@ -15,6 +16,7 @@ mod modules;
 mod odd_cells;
 mod phases;
 mod plant;
+mod queueing;
 mod rivals;
 mod saved_runs;
 mod settings;

@@ -1,7 +1,7 @@
 //! Cells that are wrong in ways beyond camera and play, with a goal that was taught on the arm.
 
 use grasp_agent::puma_val2::{Joint, JointDelta};
-use grasp_agent::{Agent, AgentError, EventKind, EventLog, GaveUp, Hybrid, Misfit};
+use grasp_agent::{Agent, AgentError, EventKind, EventLog, Hybrid};
 
 use crate::cell::{config, hybrid};
 use crate::plant::{EXTREME, HEAVY, Level, MODERATE, Odd, Plant};
@@ -161,63 +161,47 @@ fn old_images_for_ever_and_an_arm_that_stands_are_errors() {
         let unchanged =
             |end: &Result<_, AgentError>| matches!(end, Err(AgentError::Unchanged { .. }));
         assert!(ends.iter().any(unchanged), "{odd:?}: {ends:?}");
+        assert!(plant.0.borrow().stopped, "{odd:?}");
     }
 }
 
-/// Ends of runs on the first balls in this cell, and the causes of a misfit that were reported.
-fn causes(odd: Odd, seed: u64, balls: u64) -> (Vec<Option<GaveUp>>, Vec<Misfit>) {
-    let plant = Plant::new(MODERATE, odd, seed);
-    let mut agent = taught(&plant).unwrap();
-    let mut causes = Vec::new();
-    let mut ends = Vec::new();
-    for ball in 0..balls {
-        let mut log = EventLog::default();
-        ends.push(plant.run(&mut agent, ball, &mut log).0.unwrap().gave_up);
-        causes.extend(log.events.iter().filter_map(|event| match event.kind {
-            EventKind::Misfit(cause) => Some(cause),
-            _ => None,
-        }));
-    }
-    (ends, causes)
-}
+/// Turns and shifts of a camera that slips, in signs of the camera's axes.
+const WAYS: [[[f64; 3]; 2]; 6] = [
+    [[1.0, -1.0, 1.0], [1.0, 1.0, -1.0]],
+    [[-1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]],
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+    [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0]],
+    [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]],
+    [[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]],
+];
 
+/// `GRASP_CELLS=8` slips in 8 cells, in all ways.
 #[test]
 fn a_camera_that_slips_is_learned_anew() {
-    let plant = Plant::new(MODERATE, Odd::default(), 7);
-    let mut agent = taught(&plant).unwrap();
-    let mut held = Vec::new();
-    for ball in 0..30 {
-        if ball == 15 {
-            plant.0.borrow_mut().odd.slip = 1.0;
+    let cells = std::env::var("GRASP_CELLS").ok();
+    let ways = if cells.is_some() { 6 } else { 2 };
+    let cells = cells.map_or(1, |cells| cells.parse().unwrap());
+    let mut late = Vec::new();
+    for (way, to) in WAYS[..ways].iter().enumerate() {
+        for cell in 0..cells {
+            let plant = Plant::new(MODERATE, Odd::default(), 7 + cell);
+            let mut agent = taught(&plant).unwrap();
+            let mut run = |ball| plant.run(&mut agent, ball, &mut EventLog::default()).1;
+            (0..20).for_each(|ball| _ = run(ball));
+            let mut odd = plant.0.borrow().odd;
+            (odd.slip, odd.slip_to) = (1.0, Some(*to));
+            plant.0.borrow_mut().odd = odd;
+            let held: Vec<bool> = (20..50).map(&mut run).collect();
+            let last = held
+                .iter()
+                .rposition(|held| !held)
+                .map_or(0, |last| last + 1);
+            let missed = held[10..].iter().filter(|held| !**held).count();
+            println!("way {way}, cell {cell}: first {last} balls, {missed} of the last 20 missed");
+            late.extend((missed > 0).then_some((way, cell, missed)));
         }
-        held.push(plant.run(&mut agent, ball, &mut EventLog::default()).1);
     }
-    assert!(held[25..].iter().all(|held| *held), "{held:?}");
-}
-
-#[test]
-fn a_mirrored_image_is_the_named_cause() {
-    let mirrored = true;
-    let (ends, causes) = causes(
-        Odd {
-            mirrored,
-            ..Odd::default()
-        },
-        5,
-        4,
-    );
-    assert!(causes.contains(&Misfit::TurnedImage), "{causes:?}");
-    let named = |end: &Option<GaveUp>| matches!(end, Some(GaveUp::Misfit(_)));
-    assert!(ends.iter().any(named), "{ends:?}");
-}
-
-#[test]
-fn a_cell_that_fits_reports_no_misfit() {
-    let (ends, causes) = causes(Odd::default(), 5, 10);
-    assert!(
-        causes.is_empty() && ends.iter().all(Option::is_none),
-        "{causes:?} {ends:?}"
-    );
+    assert!(late.is_empty(), "{late:?}");
 }
 
 #[test]

@@ -41,8 +41,32 @@ pub(crate) struct Odd {
     pub(crate) mirrored: bool,
     /// Share of looks that show a circle anywhere.
     pub(crate) outliers: f64,
-    /// Displacement and turn of the camera on the hand from now on.
+    /// `true` if the image is upside down.
+    pub(crate) upside_down: bool,
+    /// Share of looks that show a circle at one place of the image.
+    pub(crate) ghosts: f64,
+    /// Share of looks in which the ball is missed.
+    pub(crate) missed: f64,
+    /// Step of the features, units; 0 for none.
+    pub(crate) quantum: f64,
+    /// Image noise and play instead of the level's, units and radians; 0 for the level's.
+    pub(crate) noise: f64,
+    pub(crate) play: f64,
+    /// Turn of the camera about its axis, radians.
+    pub(crate) roll: f64,
+    /// First term of the lens's radial distortion.
+    pub(crate) k1: f64,
+    /// Shares of the focal length and of the ball's radius, beside the level's.
+    pub(crate) focal: f64,
+    pub(crate) radius: f64,
+    /// Turn of `JT3` per turn of `JT2`.
+    pub(crate) drag: f64,
+    /// Slope of the table on which balls lie.
+    pub(crate) tilt: f64,
+    /// Displacement and turn of the camera on the hand from now on, as shares of 10 mm and 8
+    /// degrees, and the signs of both about the axes of the camera.
     pub(crate) slip: f64,
+    pub(crate) slip_to: Option<[[f64; 3]; 2]>,
 }
 
 /// Errors of camera, ball and play: share of the focal length, degrees of the axes, degrees of
@@ -95,6 +119,8 @@ pub(crate) struct State {
     shown: VecDeque<Option<Features>>,
     /// Jaws closed beside the ball.
     misses: usize,
+    /// `true` if the arm was told to stop.
+    pub(crate) stopped: bool,
 }
 
 /// Arm, camera and sensors of one cell.
@@ -118,10 +144,10 @@ impl Plant {
             UnitQuaternion::from_scaled_axis(turn),
         );
         let mut truth = CameraModel {
-            focal: nominal.focal * (1.0 + signed(focal)),
+            focal: nominal.focal * (1.0 + signed(focal)) * (1.0 + odd.focal),
             centre: nominal.centre.map(|c| c + signed(centre)),
-            mount: nominal.mount * off,
-            ball_radius: nominal.ball_radius * (1.0 + signed(radius)),
+            mount: nominal.mount * off * UnitQuaternion::from_scaled_axis(Vector3::z() * odd.roll),
+            ball_radius: nominal.ball_radius * (1.0 + signed(radius)) * (1.0 + odd.radius),
             ..nominal
         };
         if let Arm::Puma(arm) = &mut truth.arm {
@@ -129,11 +155,13 @@ impl Plant {
             arm.d4 += odd.links;
         }
         let home = site.config.search_poses[0];
+        let or = |own: f64, usual: f64| if own > 0.0 { own } else { usual };
+        let (play, noise) = (or(odd.play, play.to_radians()), or(odd.noise, noise));
         Self(Rc::new(RefCell::new(State {
             site,
             truth,
             odd,
-            play: play.to_radians(),
+            play,
             noise,
             rng,
             ball: Point3::new(0.6, 0.0, -0.1),
@@ -143,6 +171,7 @@ impl Plant {
             links: home,
             shown: VecDeque::new(),
             misses: 0,
+            stopped: false,
         })))
     }
 
@@ -180,7 +209,7 @@ impl Plant {
             let [(near, far), (right, left), (low, high)] = state.site.balls;
             let rho = rng.random_range(near.powi(2)..=far.powi(2)).sqrt();
             let azimuth = rng.random_range(right..=left).to_radians();
-            let height = rng.random_range(low..=high);
+            let height = rng.random_range(low..=high) + state.odd.tilt * (rho - near);
             state.ball = Point3::new(rho * azimuth.cos(), rho * azimuth.sin(), height);
             let seen = state.site.config.search_poses.iter().any(|pose| {
                 state
@@ -241,9 +270,20 @@ impl Plant {
         seed: u64,
         log: &mut EventLog,
     ) -> (Result<RunOutcome, AgentError>, bool) {
+        self.run_seen_by(&mut self.clone(), agent, seed, log)
+    }
+
+    /// The same with another eye.
+    pub(crate) fn run_seen_by<C: Controller>(
+        &self,
+        eye: &mut dyn Eye,
+        agent: &mut Agent<C>,
+        seed: u64,
+        log: &mut EventLog,
+    ) -> (Result<RunOutcome, AgentError>, bool) {
         self.place_ball(seed);
-        let (mut eye, mut arm, mut sensor) = (self.clone(), self.clone(), self.clone());
-        let end = agent.run_and_learn(&mut eye, &mut arm, &mut sensor, &mut |event| {
+        let (mut arm, mut sensor) = (self.clone(), self.clone());
+        let end = agent.run_and_learn(eye, &mut arm, &mut sensor, &mut |event| {
             log.note(event);
         });
         (end, self.0.borrow().held)
@@ -268,6 +308,7 @@ impl State {
     fn bent(&self, links: &Joints) -> Joints {
         let mut bent = *links;
         bent.0[1] += self.odd.coupling * (links.0[2] - 180_f64.to_radians());
+        bent.0[2] += self.odd.drag * (links.0[1] + 80_f64.to_radians());
         // Level at JT2 = 0; the ball is below.
         bent.0[1] += self.odd.sag * bent.0[1].cos();
         bent
@@ -277,14 +318,25 @@ impl State {
         let slip = self.odd.slip;
         let mut model = self.truth;
         if slip > 0.0 {
-            let turn = Vector3::new(1.0, -1.0, 1.0) * (8_f64.to_radians() / 3_f64.sqrt() * slip);
-            let shift = Vector3::new(1.0, 1.0, -1.0) * (0.010 / 3_f64.sqrt() * slip);
+            let to = self
+                .odd
+                .slip_to
+                .unwrap_or([[1.0, -1.0, 1.0], [1.0, 1.0, -1.0]]);
+            let [turn, shift] = to.map(|to| Vector3::from(to).normalize() * slip);
+            let (turn, shift) = (turn * 8_f64.to_radians(), shift * 0.010);
             model.mount *= Isometry3::from_parts(
                 Translation3::from(shift),
                 UnitQuaternion::from_scaled_axis(turn),
             );
         }
-        let f = model.view(stand, &self.ball)?;
+        let mut f = model.view(stand, &self.ball)?;
+        let off = [f.x - model.centre[0], f.y - model.centre[1]];
+        let squared = self.odd.k1 * off.iter().map(|v| (v / model.focal).powi(2)).sum::<f64>();
+        (f.x, f.y) = (f.x + off[0] * squared, f.y + off[1] * squared);
+        f.r *= 1.0 + 2.0 * squared;
+        if self.odd.upside_down {
+            f.y = Features::HEIGHT - f.y;
+        }
         let x = if self.odd.mirrored {
             Features::WIDTH - f.x
         } else {
@@ -319,6 +371,18 @@ impl Eye for Plant {
                 state.rng.random_range(0.0..144.0),
             );
             seen = Some(Features::new(x, y, state.rng.random_range(6.0..40.0)));
+        }
+        if state.odd.ghosts > 0.0 && state.rng.random::<f64>() < state.odd.ghosts {
+            let off = 0.3 * state.normal();
+            seen = Some(Features::new(130.0 + off, 50.0 - off, 15.0));
+        }
+        if state.odd.missed > 0.0 && state.rng.random::<f64>() < state.odd.missed {
+            seen = None;
+        }
+        if let Some(f) = seen.as_mut().filter(|_| state.odd.quantum > 0.0) {
+            let step = state.odd.quantum;
+            let [x, y, r] = [f.x, f.y, f.r].map(|v| (v / step).round() * step);
+            *f = Features::new(x, y, r.max(5.0));
         }
         let late = state.odd.late;
         state.shown.push_back(seen);
@@ -373,6 +437,7 @@ impl Manipulator for Plant {
     }
 
     fn stop(&mut self) -> Result<(), ArmError> {
+        self.0.borrow_mut().stopped = true;
         Ok(())
     }
 }

@@ -135,8 +135,8 @@ fn damaged_saved_runs_are_refused_with_the_reason() {
     let mut agent = agent_of(learned());
     let text = saved(&mut agent, &cell);
     let cases = [
-        ("grasp-agent run 6", "grasp-agent run 9", "run 9"),
-        ("grasp-agent run 6", "grasp-agent run 2", "earlier version"),
+        ("grasp-agent run 7", "grasp-agent run 9", "run 9"),
+        ("grasp-agent run 7", "grasp-agent run 2", "earlier version"),
         ("\"looks\":2", "\"looks\":0", "looks is 0"),
         (
             "\"lost_weight\":50",

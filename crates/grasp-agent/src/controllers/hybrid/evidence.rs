@@ -145,9 +145,9 @@ impl Evidence {
         evidence
     }
 
-    /// Returns the sightings as made so many poses before. Those after a pose without a sighting
-    /// are left out: the number of looks there is unknown.
-    pub(crate) fn late(&self, poses: usize) -> Self {
+    /// Returns the sightings as made so many poses before. `surely` leaves those after a pose
+    /// without a sighting out: the number of looks there is unknown, though mostly one.
+    pub(crate) fn late(&self, poses: usize, surely: bool) -> Self {
         let mut evidence = self.clone();
         evidence.sightings.clear();
         for (at, features) in &self.sightings {
@@ -158,7 +158,7 @@ impl Evidence {
                 .is_none_or(|(last, _)| last + poses < *at);
             if let Some(from) = at.checked_sub(poses)
                 && first
-                && (from..*at).all(seen)
+                && (!surely || (from..*at).all(seen))
             {
                 evidence.sightings.push((from, *features));
             }

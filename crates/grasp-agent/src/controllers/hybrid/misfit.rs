@@ -49,15 +49,19 @@ pub(crate) const ENOUGH: usize = 8;
 const FITS: f64 = 12.0;
 /// Least number of different sightings that are judged, and the least cost that a cause saves.
 const TELLS: (usize, f64) = (3, 30.0);
+/// Number of different sightings of a run from which on the run before is not needed.
+const TELLING: usize = 5;
+/// Largest cost of another cause than outliers, as a share of the cost with outliers alone.
+const BESIDE: f64 = 0.8;
 /// Largest cost of the right cause, as a share of the cost without it.
 const EXPLAINED: f64 = 0.6;
 /// Cost of a sighting that is taken for an outlier, feature units squared, and the largest share of
 /// such sightings.
-const OUTLYING: (f64, f64) = (30.0, 0.6);
+const OUTLYING: (f64, f64) = (30.0, 0.7);
 /// Least share of the sightings of which a lag says the pose.
 const WHOLE: f64 = 0.5;
 /// Dead zones that are tried, radians: the first, and the ratio of one to the next.
-const DEAD_ZONES: (f64, f64, i32) = (0.005, 1.2, 11);
+const DEAD_ZONES: (f64, f64, i32) = (0.005, 1.2, 14);
 /// Turns of `JT3` per turn of `JT2` that are tried.
 const DRAGS: [f64; 4] = [-0.3, -0.12, 0.12, 0.3];
 
@@ -71,6 +75,10 @@ pub(crate) fn misfit(
     calm: bool,
 ) -> Option<Misfit> {
     let fresh = belief.fresh(prior);
+    // An arm that stands in few poses tells too little in one run.
+    let many = record.thinned().len() >= TELLING;
+    let none = Evidence::default();
+    let recent = if many { &none } else { recent };
     let pair = |other: &dyn Fn(&Evidence) -> Evidence| [other(recent), other(record)];
     // Mean cost of a sighting: squared feature units, up to the outliers.
     let cost = |records: &[Evidence; 2]| {
@@ -90,6 +98,7 @@ pub(crate) fn misfit(
     // Rows of the matrices by which x and y are turned.
     let turns = [
         [-1.0, 0.0, 0.0, 1.0],
+        [1.0, 0.0, 0.0, -1.0],
         [-1.0, 0.0, 0.0, -1.0],
         [0.0, 1.0, -1.0, 0.0],
         [0.0, -1.0, 1.0, 0.0],
@@ -102,7 +111,11 @@ pub(crate) fn misfit(
         };
         (Misfit::TurnedImage, pair(&|record| record.seen_as(turned)))
     });
-    let late = [1, 2, 3].map(|poses| (Misfit::LateImages, pair(&|record| record.late(poses))));
+    let lags = [1, 2, 3].map(|poses| [(poses, true), (poses, false)]);
+    let late = lags.as_flattened().iter().map(|(poses, surely)| {
+        let late = pair(&|record| record.late(*poses, *surely));
+        (Misfit::LateImages, late)
+    });
     let (least, ratio, number) = DEAD_ZONES;
     let zones = (0..number).map(|i| least * ratio.powi(i));
     let dead = zones.map(|zone| (Misfit::DeadZone, pair(&|record| record.sticking(zone))));
@@ -132,20 +145,29 @@ pub(crate) fn misfit(
             None => of_cause.push((cause, cost, record)),
         }
     }
+    let rest = |record: &Evidence| {
+        without_outliers(&record.thinned(), &fresh, nominal).unwrap_or(f64::INFINITY)
+    };
+    let outliers = rest(record);
     for (cause, cost, record) in of_cause {
-        let least =
-            without_outliers(&record[1].thinned(), &fresh, nominal).unwrap_or(f64::INFINITY);
-        let least = if cause == Misfit::Outliers {
-            least
-        } else {
-            least.min(cost)
+        // Outliers alone say more than outliers and another cause that saves little beside them.
+        let least = match cause {
+            Misfit::Outliers => outliers,
+            _ => cost.min(rest(&record[1])) / BESIDE,
         };
         if best.is_none_or(|(_, other)| least < other) {
             best = Some((cause, least));
         }
     }
-    let tells = |cost: f64| cost < EXPLAINED * plain && (plain - cost) * number > TELLS.1;
-    let explained = best.filter(|(_, cost)| tells(*cost));
+    let tells = |cause, cost: f64| {
+        let own = if cause == Misfit::Outliers {
+            cost
+        } else {
+            BESIDE * cost
+        };
+        own < EXPLAINED * plain && (plain - own) * number > TELLS.1
+    };
+    let explained = best.filter(|(cause, cost)| tells(*cause, *cost));
     Some(explained.map_or(Misfit::Unexplained, |(cause, _)| cause))
 }
 

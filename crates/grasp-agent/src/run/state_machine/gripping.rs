@@ -33,6 +33,7 @@ impl Run<'_> {
         if !is_same_place(seen, &ball) {
             // Costs a cycle: both looks can be at the goal, and no move is made between them.
             self.cycles += 1;
+            self.unsteady += 1;
             return Ok(if self.cycles >= self.config.max_cycles {
                 State::End(Some(GaveUp::OutOfCycles))
             } else {

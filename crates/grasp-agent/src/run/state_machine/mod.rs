@@ -107,6 +107,11 @@ pub(crate) struct Run<'a> {
     own_barred: bool,
     /// `true` while joints are freed from friction.
     freeing: bool,
+    /// Grips that missed, and looks from one pose that differed.
+    missed: usize,
+    unsteady: usize,
+    /// Sighting from which the ball has kept its place in the image, and the moves before it.
+    kept: Option<(Sighting, usize)>,
     /// Cause reported last for a model that does not fit.
     misfit: Option<Misfit>,
 }
@@ -140,6 +145,9 @@ impl<'a> Run<'a> {
             barred_grips: 0,
             own_barred: false,
             freeing: false,
+            missed: 0,
+            unsteady: 0,
+            kept: None,
             misfit: None,
         }
     }
@@ -185,6 +193,7 @@ impl<'a> Run<'a> {
             if let State::Recover { missed, .. } = next {
                 self.losses += usize::from(!missed);
                 self.cycles += usize::from(missed);
+                self.missed += usize::from(missed);
             }
             state = next;
         }
@@ -199,12 +208,23 @@ impl<'a> Run<'a> {
                 self.tell(EventKind::Misfit(cause));
             }
         }
-        match (next, cause) {
-            (State::End(Some(GaveUp::OutOfCycles | GaveUp::NotFound)), Some(cause)) => {
-                State::End(Some(GaveUp::Misfit(cause)))
-            }
-            _ => next,
-        }
+        let State::End(Some(reason)) = next else {
+            return next;
+        };
+        let named = cause.filter(|cause| *cause != Misfit::Unexplained);
+        let replaced = matches!(
+            reason,
+            GaveUp::OutOfCycles | GaveUp::NotFound | GaveUp::NoMoveLeft
+        );
+        let reason = match (reason, named) {
+            (_, Some(cause)) if replaced => GaveUp::Misfit(cause),
+            (GaveUp::OutOfCycles, None) => match (self.out_of_cycles(), cause) {
+                (GaveUp::OutOfCycles, Some(cause)) => GaveUp::Misfit(cause),
+                (reason, _) => reason,
+            },
+            (reason, _) => reason,
+        };
+        State::End(Some(reason))
     }
 
     /// Looks around until the ball is in view, the search names no more viewpoints, or it has named
@@ -387,6 +407,28 @@ impl<'a> Run<'a> {
         let first = self.first_seen.get_or_insert(ball);
         self.wandered |= !is_same_place(first, &ball);
         self.last_seen = Some(ball);
+        if self
+            .kept
+            .is_none_or(|(kept, _)| !is_same_place(&kept, &ball))
+        {
+            self.kept = Some((ball, self.cycles));
+        }
+    }
+
+    /// Returns the reason of a run without moves left.
+    fn out_of_cycles(&self) -> GaveUp {
+        let counts = [
+            (self.missed, GaveUp::KeptMissing),
+            (self.losses, GaveUp::KeptLosing),
+            (self.unsteady, GaveUp::Unsteady),
+        ];
+        let most = counts.into_iter().max_by_key(|(count, _)| *count);
+        let kept = self.kept.map_or(0, |(_, since)| self.cycles - since);
+        match most {
+            Some((count, reason)) if count >= OFTEN => reason,
+            _ if kept * 4 >= self.config.max_cycles => GaveUp::NoProgress,
+            _ => GaveUp::OutOfCycles,
+        }
     }
 }
 

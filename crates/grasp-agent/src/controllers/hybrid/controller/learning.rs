@@ -14,16 +14,20 @@ const SLIP_SHOWS: (usize, f64, f64) = (3, 80.0, 3.0);
 const CALM: usize = 3;
 /// Number of own aims that may miss in one run before the arm is in doubt.
 const OFTEN: usize = 3;
+/// Least number of sightings that are judged after losses.
+const FEW: usize = 4;
+/// Number of causes that are remembered.
+const VOTES: usize = 12;
 
 impl Hybrid {
     /// Creates a controller that decides by a belief as it is, and learns nothing. The marks say
-    /// that a goal was taught, and that the camera has slipped; the rest is the run before and the
-    /// number of runs that fitted.
+    /// that a goal was taught, and that the camera has slipped; the rest is the run before, the
+    /// number of runs that fitted, and the causes found last.
     pub(crate) fn restored(
         settings: HybridSettings,
         belief: Belief,
         [shown, slipped]: [bool; 2],
-        (recent, calm): (Evidence, usize),
+        (recent, calm, causes): (Evidence, usize, Vec<Misfit>),
     ) -> Self {
         Self {
             learning: false,
@@ -31,6 +35,7 @@ impl Hybrid {
             slipped,
             recent,
             calm,
+            causes,
             ..Self::beginning(settings, belief)
         }
     }
@@ -51,16 +56,46 @@ impl Hybrid {
     /// Looks for the cause of residuals that are too large: each time that the sightings have
     /// doubled.
     pub(super) fn judge(&mut self) {
-        let (record, settings) = (&self.run.record, &self.settings);
-        if record.len() >= ENOUGH && record.len().is_power_of_two() {
-            let calm = self.calm >= CALM;
-            let (prior, nominal) = (&settings.prior, &settings.nominal);
-            let cause = misfit([&self.recent, record], &self.belief, prior, nominal, calm);
-            self.run.misfit = cause.or(self.run.misfit);
+        let number = self.run.record.len();
+        if number >= ENOUGH && number.is_power_of_two() {
+            self.find_cause();
         }
         if self.run.misses > OFTEN && self.run.sure {
             self.run.misfit = self.run.misfit.or(Some(Misfit::Arm));
         }
+    }
+
+    /// Looks for the cause of losses, each time that they have doubled: few sightings are made
+    /// then. Without it, the cause is the one of the runs before.
+    pub(super) fn judge_loss(&mut self) {
+        self.run.losses = self.run.losses.map(|losses| losses + 1);
+        let losses = self.run.losses[1];
+        if losses < 2 || !losses.is_power_of_two() {
+            return;
+        }
+        if self.run.record.len() >= FEW {
+            self.find_cause();
+        }
+        self.run.misfit = self.run.misfit.or_else(|| self.usual_cause());
+    }
+
+    fn find_cause(&mut self) {
+        let (record, settings) = (&self.run.record, &self.settings);
+        let (prior, nominal, calm) = (&settings.prior, &settings.nominal, self.calm >= CALM);
+        let Some(cause) = misfit([&self.recent, record], &self.belief, prior, nominal, calm) else {
+            return;
+        };
+        if cause != Misfit::Unexplained {
+            self.causes.push(cause);
+            self.causes.drain(..self.causes.len().saturating_sub(VOTES));
+        }
+        self.run.misfit = Some(self.usual_cause().unwrap_or(cause));
+    }
+
+    /// Returns the most frequent of the causes found last, the latest of equally frequent ones.
+    fn usual_cause(&self) -> Option<Misfit> {
+        let votes = |cause: &&Misfit| self.causes.iter().filter(|c| c == cause).count();
+        self.causes.iter().max_by_key(votes).copied()
     }
 
     /// Returns `true` if the last two runs contradict the belief and agree on another mount of the
@@ -84,8 +119,14 @@ impl Hybrid {
     pub(super) fn learn(&mut self) {
         self.remember();
         self.slipped = self.learning && self.calm >= CALM && self.has_slipped();
-        let fits = matches!(self.run.misfit, None | Some(Misfit::CameraSlipped));
-        self.calm = if fits { self.calm + 1 } else { 0 };
+        match self.run.misfit {
+            None | Some(Misfit::CameraSlipped) => self.calm += 1,
+            Some(Misfit::Unexplained) => {}
+            Some(_) => self.calm = 0,
+        }
+        if self.run.misfit.is_none() {
+            self.causes.drain(..self.causes.len().min(1));
+        }
         let record = std::mem::take(&mut self.run.record);
         let recent = std::mem::replace(&mut self.recent, record.clone());
         if self.slipped {

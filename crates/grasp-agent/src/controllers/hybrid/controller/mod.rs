@@ -41,6 +41,8 @@ pub struct Hybrid {
     slipped: bool,
     /// Number of latest runs, in order, that the model fitted.
     calm: usize,
+    /// Causes of a misfit that were found last, in order.
+    causes: Vec<Misfit>,
     /// Set while a remembered run is not yet part of the belief.
     news: bool,
     learning: bool,
@@ -62,8 +64,8 @@ struct Run {
     estimate: Option<Estimate>,
     /// Fraction of the planned moves that is made.
     boldness: f64,
-    /// Losses since the last move that kept the ball in view.
-    losses: usize,
+    /// Losses since the last move that kept the ball in view, and all of them.
+    losses: [usize; 2],
     /// Set after a sighting far from the expected place; a second one confirms it.
     doubt: bool,
     /// Remaining sightings for which a ball that has moved counts as moving.
@@ -88,7 +90,7 @@ impl Default for Run {
             seen: None,
             estimate: None,
             boldness: 1.0,
-            losses: 0,
+            losses: [0; 2],
             doubt: false,
             moving: 0,
             grips: 0,
@@ -154,6 +156,7 @@ impl Hybrid {
             recent: Evidence::default(),
             slipped: false,
             calm: 0,
+            causes: Vec::new(),
             news: false,
             learning: true,
             shown: false,
@@ -346,7 +349,7 @@ impl Hybrid {
             self.run.moving.saturating_sub(1)
         };
         // Two losses of a ball that should have stayed in view: the estimate is wrong.
-        let mistaken = self.run.losses >= 2;
+        let mistaken = self.run.losses[0] >= 2;
         if odd || mistaken {
             if !mistaken {
                 self.remember();
@@ -395,11 +398,13 @@ impl Controller for Hybrid {
             }
             Feedback::Seen { ball, .. } => {
                 self.run.seen = ball.is_finite().then_some(ball.features);
-                (self.run.boldness, self.run.losses) = ((1.5 * self.run.boldness).min(1.0), 0);
+                (self.run.boldness, self.run.losses[0]) = ((1.5 * self.run.boldness).min(1.0), 0);
             }
             Feedback::Lost | Feedback::TakenBack => {
                 self.run.boldness = (0.5 * self.run.boldness).max(LEAST_BOLDNESS);
-                self.run.losses += usize::from(*feedback == Feedback::Lost);
+                if *feedback == Feedback::Lost {
+                    self.judge_loss();
+                }
             }
             // An aim that holds only confirms the belief that it was made by.
             Feedback::Held(joints) if !self.run.aimed || self.run.misses > 0 => {
@@ -424,7 +429,7 @@ impl Controller for Hybrid {
 
     fn save(&self) -> Option<SavedController> {
         let marks = [self.shown, self.slipped];
-        let before = (&self.recent, self.calm);
+        let before = (&self.recent, self.calm, &self.causes);
         SavedController::new("hybrid", (self.settings, &self.belief, marks, before))
     }
 }
