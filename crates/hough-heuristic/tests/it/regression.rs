@@ -456,26 +456,33 @@ fn lines_drawn_by_hand_or_dashed_are_found() {
 }
 
 #[test]
-fn a_faint_line_amid_strong_bars_is_found() {
+fn faint_lines_amid_strong_bars_are_found() {
     let ring = circle(168.0, 176.5, 123.0);
-    let frame = Picture { side: 340, ..PLAIN }.draw(|x, y| {
-        let (across, along) = (
-            (0.8 * x + 0.6 * y) % 61.0,
-            (0.8 * y - 0.6 * x).rem_euclid(83.0),
-        );
-        let on = ((x - ring.x).hypot(y - ring.y) - ring.radius).abs() < 0.9;
-        match (across < 4.0 && along < 35.0, on) {
-            (true, _) => 245.0,
-            (false, true) => 60.0,
-            _ => 95.0,
-        }
-    });
-    for (view, at) in views(&frame).iter().step_by(3) {
+    let mut hits = 0;
+    for seed in 0..4 {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut random = |range: f64| range * f64::from(rng.next_u32()) / f64::from(u32::MAX);
+        let mut bar = || [340.0, 340.0, 6.3, 15.0, 1.0].map(&mut random);
+        let bars: Vec<[f64; 5]> = (0..44).map(|_| bar()).collect();
+        let frame = Picture { side: 340, ..PLAIN }.draw(|x, y| {
+            let over = |&&[cx, cy, angle, half, _]: &&[f64; 5]| {
+                let (dx, dy) = (x - cx, y - cy);
+                if dx.abs() + dy.abs() > 45.0 {
+                    return false;
+                }
+                let (sin, cos) = angle.sin_cos();
+                (dx * cos + dy * sin).abs() < 12.0 + half && (dy * cos - dx * sin).abs() < 2.0
+            };
+            let on = ((x - ring.x).hypot(y - ring.y) - ring.radius).abs() < 0.9;
+            let bar = bars.iter().find(over);
+            bar.map_or(if on { 60.0 } else { 100.0 }, |bar| {
+                10.0 + 235.0 * bar[4].round()
+            })
+        });
         let mut detector = detector(60.0, 160.0);
-        let found = detector.detect(view).unwrap();
-        assert!(
-            found.len() == 1 && same(&found[0].circle, &at(&ring), 4.0),
-            "{found:?}"
-        );
+        let found = detector.detect(&frame).unwrap();
+        hits += usize::from(found.iter().any(|one| same(&one.circle, &ring, 3.0)));
+        assert!(found.len() <= 1, "{found:?}");
     }
+    assert!(hits >= 3, "{hits} of 4");
 }
