@@ -15,7 +15,7 @@ use hough_heuristic::{Circle, Features};
 use pipeline_sim::{
     Ball, Cell, ErrorLevel, Errors, FeatureCamera, SharedCell, SimulatedArm, Workspace,
 };
-use puma_val2::{Joint, JointDelta, Joints};
+use puma_val2::{Joint, JointDelta, Joints, Kinematics};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
@@ -284,7 +284,7 @@ fn offs(truth: &Truth, found: &Calibration) -> Offs {
     offs.extend(ball.iter().map(|ball| 1000.0 * ball));
     let names = found.estimates.iter().map(|estimate| &estimate.name);
     let zeros = Joint::ALL.into_iter().filter(|joint| {
-        let name = format!("zero of {joint} ");
+        let name = format!("zero of {} ", model.arm.names()[joint.index()]);
         names.clone().any(|known| known.starts_with(&name))
     });
     for joint in zeros {

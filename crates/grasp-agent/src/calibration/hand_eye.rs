@@ -35,8 +35,8 @@ pub struct HandEye {
     pub looks: usize,
     /// Estimate the zeros of joints (default `true`). Without, the encoders are believed.
     pub zeros: bool,
-    /// Least distance of the ball's centre from the line between hand and tool point, metres
-    /// (default .06).
+    /// Least distance of the ball's centre from the line between hand and tool point, and from the
+    /// camera, metres (default .07): half the opening of the jaws, a finger and the ball.
     pub clearance: f64,
     /// Turn by which each joint comes to its place from below, radians (default .07). It takes the
     /// same side of all play; 0 moves straight.
@@ -76,6 +76,9 @@ pub struct Estimate {
     pub error: f64,
 }
 
+/// Greatest noise with which looks fit, feature units: three times that of a poor detector.
+const FITS: f64 = 2.5;
+
 impl HandEye {
     /// Creates the settings for a cell that is meant to be like `nominal`.
     pub fn new(nominal: CameraModel) -> Self {
@@ -84,7 +87,7 @@ impl HandEye {
             limits: JointLimits(nominal.arm.limits()),
             looks: 15,
             zeros: true,
-            clearance: 0.06,
+            clearance: 0.07,
             approach: 0.07,
             seed: 1,
         }
@@ -200,6 +203,16 @@ impl HandEye {
             fit.noise = fit.noise_at(&cell, &covariance);
         }
         let noise = fit.noise;
+        if noise[0] > FITS {
+            return Err(unseen(&format!(
+                "the looks fit no camera near the nominal one: they are {:.1} units from the best; \
+                 check that the ball rests and that arm and nominal camera are the right ones",
+                noise[0]
+            )));
+        }
+        // Student's factor: the noise is estimated by the same looks.
+        let spare = (3 * kept.len()).saturating_sub(covariance.nrows()).max(1);
+        covariance *= 1.0 + 2.4 / spare as f64;
         let left_out = looks.len() - kept.len();
         Ok(self.result(&cell, &covariance, &zeros, noise, left_out))
     }
@@ -280,7 +293,7 @@ impl HandEye {
         let (weakest, least) = even.eigenvalues.argmin();
         if least.is_nan() || least < 1e-10 {
             let direction = even.eigenvectors.column(weakest).abs();
-            let name = name(direction.argmax().0, zeros);
+            let name = self.name(direction.argmax().0, zeros);
             return Err(unseen(&format!(
                 "the looks do not determine {name}; look from more different poses, or do without \
                  the zeros of joints"
@@ -289,6 +302,24 @@ impl HandEye {
         let inverse = DMatrix::from_diagonal(&even.eigenvalues.map(f64::recip));
         let even = &even.eigenvectors * inverse * even.eigenvectors.transpose();
         Ok(&scale * even * &scale)
+    }
+
+    /// Returns the name of a quantity.
+    fn name(&self, i: usize, zeros: &[Joint]) -> String {
+        let axis = |from: usize| ["x", "y", "z"][i - from];
+        match i {
+            _ if i < at::SHIFT => format!("turn about the camera's {} (degrees)", axis(at::TURN)),
+            _ if i < at::FOCAL => format!("camera {} in the hand (mm)", axis(at::SHIFT)),
+            at::FOCAL => "focal length (units)".into(),
+            _ if i < at::DISTORTION => format!("principal point {} (units)", axis(at::CENTRE)),
+            at::DISTORTION => "distortion k1".into(),
+            at::RADIUS => "radius of the ball (mm)".into(),
+            _ if i < at::ZEROS => format!("ball {} (mm)", axis(at::BALL)),
+            _ => {
+                let joint = zeros[i - at::ZEROS].index();
+                format!("zero of {} (degrees)", self.nominal.arm.names()[joint])
+            }
+        }
     }
 
     fn result(
@@ -319,7 +350,7 @@ impl HandEye {
                 }
             };
             Estimate {
-                name: name(i, zeros),
+                name: self.name(i, zeros),
                 value,
                 error: unit * covariance[(i, i)].max(0.0).sqrt(),
             }
@@ -338,21 +369,6 @@ impl HandEye {
 
 fn unseen(what: &str) -> AgentError {
     AgentError::Calibration(what.to_owned())
-}
-
-/// Returns the name of a quantity.
-fn name(i: usize, zeros: &[Joint]) -> String {
-    let axis = |from: usize| ["x", "y", "z"][i - from];
-    match i {
-        _ if i < at::SHIFT => format!("turn about the camera's {} (degrees)", axis(at::TURN)),
-        _ if i < at::FOCAL => format!("camera {} in the hand (mm)", axis(at::SHIFT)),
-        at::FOCAL => "focal length (units)".into(),
-        _ if i < at::DISTORTION => format!("principal point {} (units)", axis(at::CENTRE)),
-        at::DISTORTION => "distortion k1".into(),
-        at::RADIUS => "radius of the ball (mm)".into(),
-        _ if i < at::ZEROS => format!("ball {} (mm)", axis(at::BALL)),
-        _ => format!("zero of {} (degrees)", zeros[i - at::ZEROS]),
-    }
 }
 
 impl fmt::Display for Calibration {

@@ -1,11 +1,11 @@
 //! The choice of the next pose to look from.
 
 use hough_heuristic::Features;
-use nalgebra::{DMatrix, Matrix3, Point3};
+use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
 use puma_val2::{Joint, JointDelta, Joints};
 use qtable::rand::{Rng, RngExt};
 
-use crate::calibration::cell::Estimated;
+use crate::calibration::cell::{Estimated, at};
 use crate::calibration::hand_eye::HandEye;
 
 /// Number of poses to choose among.
@@ -81,14 +81,24 @@ impl Known<'_> {
         })
     }
 
-    /// Returns the distance of the ball's centre from the line between hand and tool point.
+    /// Returns the distance of the ball's centre from the line between hand and tool point, or from
+    /// the camera if that is nearer, less what the place of the ball is uncertain by.
     fn distance(&self, pose: &Joints) -> f64 {
+        /// Deviations of the ball's place, over those of the image.
+        const SURE: f64 = 1.0;
         let (model, ball) = (&self.cell.model, &self.cell.ball);
-        let hand = model.arm.wrist(pose) * Point3::new(0.0, 0.0, model.arm.flange());
-        let along = model.tool_point(pose) - hand;
+        let wrist = model.arm.wrist(&(*pose + self.cell.zeros));
+        let hand = wrist * Point3::new(0.0, 0.0, model.arm.flange());
+        let along = wrist * Vector3::new(0.0, 0.0, model.tool);
         let share = (ball - hand).dot(&along) / along.norm_squared().max(1e-12);
         let nearest = hand + along * share.clamp(0.0, 1.0);
-        (ball - nearest).norm()
+        let camera = wrist * Point3::from(model.mount.translation.vector);
+        let unsure = self.covariance.fixed_view::<3, 3>(at::BALL, at::BALL);
+        let surely = |from: Point3<f64>| {
+            let (away, distance) = ((ball - from).normalize(), (ball - from).norm());
+            distance - SURE * self.care * (away.transpose() * unsure * away)[0].max(0.0).sqrt()
+        };
+        surely(nearest).min(surely(camera))
     }
 
     /// Draws a pose that shows the ball somewhere in the image, or one on the way there.

@@ -148,6 +148,17 @@ fn arms_of_seven_and_of_four_joints_are_learned_and_grasp() {
     }
 }
 
+/// With `JT3` at its limit in the search poses, many ways to the ball lead beyond it.
+#[test]
+fn from_a_joint_at_its_limit_every_ball_is_reached() {
+    let mut site = Site::puma();
+    for pose in &mut site.config.search_poses {
+        pose.0[2] = site.config.limits.0[2].1;
+    }
+    let (held, moves) = held(&site, NONE, 4, 8);
+    assert!(held == 8 && moves < 64, "{held} of 8, {moves}");
+}
+
 /// An arm whose third joint does not move.
 struct Stuck(Joints);
 

@@ -144,3 +144,28 @@ fn calibrations_that_cannot_be_made_are_refused_with_the_reason() {
     let refused = task.fit(&looks).unwrap_err().to_string();
     assert!(refused.contains("do not determine"), "{refused}");
 }
+
+#[test]
+fn looks_at_a_ball_that_was_pushed_are_refused() {
+    let model = CameraModel::paper();
+    let looks = |pushed: f64| {
+        let look = |k: i32| {
+            let turn = |step: i32| f64::from((k * step) % 11 - 5);
+            let wrist = [8.0 * turn(5), 45.0 + 4.0 * turn(2), 8.0 * turn(7)];
+            let [j4, j5, j6] = wrist;
+            let joints = [turn(3), -80.0 + turn(4), 190.0 + turn(6), j4, j5, j6];
+            let joints = Joints::from_degrees(joints);
+            let aside = if k > 8 { pushed } else { 0.0 };
+            Some((
+                joints,
+                model.view(&joints, &[0.75, 0.15 + aside, -0.15].into())?,
+            ))
+        };
+        (0..20).filter_map(look).collect::<Vec<_>>()
+    };
+    let task = HandEye::new(model);
+    let found = task.fit(&looks(0.0)).unwrap();
+    assert!((found.model.focal / model.focal - 1.0).abs() < 1e-3);
+    let refused = task.fit(&looks(0.04)).unwrap_err().to_string();
+    assert!(refused.contains("the ball rests"), "{refused}");
+}
