@@ -2,6 +2,7 @@
 
 use image::GrayImage;
 
+use super::against::Against;
 use super::budget::ROUND;
 use super::candidate::Candidate;
 use super::directions::UnitCircle;
@@ -21,7 +22,7 @@ const NOISY: f32 = 8.0;
 /// Least radius of a circle that is examined a second time at half the size, pixels there.
 const LEAST_SECOND: f32 = 4.0;
 /// Certainty from which no larger size is examined, except in noise.
-const SURE: f32 = 12.0;
+const SURE: f32 = 24.0;
 /// Reach of the search for edges in the narrow window, for a doubtful circle, radii.
 const NARROW: f32 = 0.15;
 /// Least reach of the narrow window next to another outline, pixels.
@@ -123,7 +124,7 @@ impl Prover<'_> {
         if finest > 0
             && self.noise <= NOISY
             && candidate.weight >= LEAST_WEIGHT
-            && best.is_none_or(|first| !first.is_beyond_doubt())
+            && best.is_none_or(|first| first.certainty < SURE)
         {
             let narrow = Some(Narrow::Within(NARROW * candidate.r));
             let finer = self.prove_at(finest - 1, &candidate.ring(), narrow, looks);
@@ -205,7 +206,7 @@ impl Prover<'_> {
     /// Weighs the evidence against a circle, and keeps the proof.
     fn conclude(&mut self, mut proof: Proof, looks: &mut u64) -> Option<Ring> {
         if proof.certainty >= LEAST_REFUTED {
-            proof.leave(self.refute(&proof, &[], looks));
+            proof.weaken(self.refute(&proof, &[], looks));
         }
         self.proofs.push(proof);
         proof.is_beyond_doubt().then(|| proof.in_frame())
@@ -236,9 +237,8 @@ impl Prover<'_> {
         Some(Proof { depth, ..proof })
     }
 
-    /// The part of a proof's certainty that the evidence against the circle leaves, if these other
-    /// circles are there.
-    pub(super) fn refute(&mut self, proof: &Proof, others: &[Ring], looks: &mut u64) -> f32 {
+    /// What speaks against a circle, if these other circles are there.
+    pub(super) fn refute(&mut self, proof: &Proof, others: &[Ring], looks: &mut u64) -> Against {
         *looks += ROUND;
         let ring = proof.in_frame();
         let depth = self.depth_for(ring.r);
@@ -308,13 +308,13 @@ struct Refuting<'a> {
 }
 
 impl Vectorized for Refuting<'_> {
-    type Output = f32;
+    type Output = Against;
 
     #[inline(always)]
-    fn run(self) -> f32 {
+    fn run(self) -> Against {
         let rays = self.circle.rays(RAYS);
         let others = self.others.iter().map(|other| other.shrunk(self.scale));
-        refute::left(
+        refute::against(
             self.gray, rays, self.polar, &self.ring, self.noise, self.proof, others,
         )
     }

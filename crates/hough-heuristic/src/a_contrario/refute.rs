@@ -1,16 +1,25 @@
 //! Evidence against a circle: the rays on which its outline would be seen if it were there.
 //!
 //! The proof weighs the rays that fit. Here those that do not are asked: a ray on which both sides
-//! of the outline have the level of the thing, or both that of the ground, refutes the circle, and
-//! so does one on which the outline is followed off the circle. A thing in front excuses them: at a
-//! T-junction the levels change along the outline on both of its sides.
+//! of the outline have the level of the thing, or both that of the ground, refutes the circle. A
+//! thing in front excuses them: at a T-junction the levels change along the outline on both of its
+//! sides. An outline that goes on off the circle has a price of its own.
 
+use super::against::Against;
 use super::directions::Rays;
 use super::ellipse;
+use super::leaving::{self, Ends, Leaving};
 use super::polar::{Gray, Polar, Ring};
 use super::proof::{NOISE, Proof, window_for};
 use super::strongest::{Edges, RAYS};
 
+/// No certainty is left.
+const OUT: Against = Against {
+    left: 0.0,
+    price: 0.0,
+};
+/// Certainty subtracted for each end of a part of the outline that goes on off the circle.
+const LEAVING: f32 = 4.0;
 /// Inverse of the share of refuted rays at which no certainty is left.
 const PRICE: f32 = 3.0;
 /// Share of rays without any edge above which a circle is dropped.
@@ -25,8 +34,6 @@ const WHOLE: f32 = 0.9;
 const BESIDE: f32 = 2.5;
 /// Number of rays on the outline below which no evidence against the circle is sought.
 const LEAST_HITS: usize = 8;
-/// Least number of rays in a part of the outline that is followed.
-const LEAST_PART: usize = 3;
 /// Rays at the end of a part that its levels are taken from.
 const END: usize = 4;
 /// The least step at a junction, in contrasts of the outline.
@@ -44,8 +51,6 @@ const HALF_EXCUSED: f32 = 0.75;
 struct Around<'a> {
     polar: &'a Polar,
     edges: &'a Edges,
-    /// Steps between the ends of the window and the outline.
-    reach: usize,
     half: usize,
     /// Radius and deviation of the noise, of the size looked at.
     r: f32,
@@ -54,10 +59,10 @@ struct Around<'a> {
     level_noise: f32,
     /// Usual changes of the levels along the outline, inside and outside.
     uneven: [f32; 2],
-    /// The outline's sign, slope and contrast.
-    sign: f32,
-    slope: f32,
+    /// The outline's contrast.
     contrast: f32,
+    /// Rays between ends at which it goes on, as in [`Ends`].
+    between: u64,
 }
 
 /// The levels on either side of the outline at the end of one of its parts.
@@ -73,8 +78,6 @@ struct End {
     levels: Levels,
     /// Set if something in front begins here, or the frame ends.
     excused: bool,
-    /// Set if the outline goes on off the circle.
-    leaves: bool,
 }
 
 /// The state of a ray.
@@ -87,9 +90,9 @@ enum Ray {
     Missing,
 }
 
-/// The part of the certainty that is left to a proven circle: 0..=1.
+/// What speaks against a proven circle.
 #[inline(always)]
-pub(super) fn left(
+pub(super) fn against(
     gray: Gray<'_>,
     rays: Rays<'_>,
     polar: &mut Polar,
@@ -97,9 +100,9 @@ pub(super) fn left(
     noise: f32,
     proof: &Proof,
     others: impl Iterator<Item = Ring>,
-) -> f32 {
+) -> Against {
     if proof.visible < WHOLE && proof.covered * proof.visible < LEAST_SEEN {
-        return 0.0;
+        return OUT;
     }
     let window = window_for(ring, noise);
     let edges = Edges::around(ring, gray, rays, polar, window);
@@ -110,19 +113,6 @@ pub(super) fn left(
     let mut slopes = [0.0; RAYS];
     let mut contrasts = [0.0; RAYS];
     let (mut hits, mut signs) = (0, 0.0f32);
-    let mut around = Around {
-        polar,
-        edges: &edges,
-        reach: window.reach,
-        half: window.half,
-        r: ring.r,
-        noise,
-        level_noise: noise / (2.0 * window.half as f32 + 1.0).sqrt(),
-        uneven: [0.0; 2],
-        sign: 1.0,
-        slope: 0.0,
-        contrast: 0.0,
-    };
     let mut states = [Ray::Missing; RAYS];
     let mut is_hit = [false; RAYS];
     let mut visible = 0.0;
@@ -137,32 +127,61 @@ pub(super) fn left(
             if edges.distance[ray].abs() <= tolerance {
                 is_hit[ray] = true;
                 slopes[hits] = edges.slope[ray];
-                contrasts[hits] = (around.beside(ray, 0.0, 1) - around.beside(ray, 0.0, -1)).abs();
+                let [outer, inner] = [1, -1].map(|side| beside(polar, window.half, ray, side));
+                contrasts[hits] = (outer - inner).abs();
                 signs += edges.sign[ray];
                 hits += 1;
             }
         }
     }
     if hits < LEAST_HITS {
-        return 1.0;
+        return Against::default();
     }
-    around.sign = 1f32.copysign(signs);
-    around.slope = median(&mut slopes[..hits]);
-    around.contrast = median(&mut contrasts[..hits]);
+    let sign = 1f32.copysign(signs);
+    let slope = median(&mut slopes[..hits]);
+    let contrast = median(&mut contrasts[..hits]);
     if ellipse::fits_better(
         rays,
         &edges,
         polar,
-        (around.sign, around.slope),
+        (sign, slope),
         ring,
         tolerance,
         proof.covered,
     ) {
-        return 0.0;
+        return OUT;
     }
+    polar.sample(gray, rays, ring, leaving::reach(ring.r), window.half);
+    let level_noise = noise / (2.0 * window.half as f32 + 1.0).sqrt();
+    let own = std::array::from_fn(|ray| states[ray] == Ray::Near && edges.sign[ray] * sign > 0.0);
+    let leaving = Leaving {
+        polar,
+        edges: &edges,
+        r: ring.r,
+        sign,
+        contrast,
+        uncertain: 2.0 * level_noise,
+    };
+    // In noise an edge is followed to others by chance.
+    let ends = if noise > NOISE {
+        Ends::default()
+    } else {
+        leaving.ends(&own)
+    };
+    let mut around = Around {
+        polar,
+        edges: &edges,
+        half: window.half,
+        r: ring.r,
+        noise,
+        level_noise,
+        uneven: [0.0; 2],
+        contrast,
+        between: ends.between,
+    };
     around.uneven = [0.0, around.unevenness(&states, 1.0)];
     let Some(first) = (0..RAYS).find(|&ray| states[ray] == Ray::Near) else {
-        return 1.0;
+        return Against::default();
     };
     let (mut refuted, mut bare) = (0.0, 0.0);
     let mut at = first;
@@ -179,26 +198,22 @@ pub(super) fn left(
         refuted += gap.0;
         bare += gap.1;
     }
-    if bare > MOST_BARE * RAYS as f32 && around.slope > STEEP * noise {
-        return 0.0;
+    if bare > MOST_BARE * RAYS as f32 && slope > STEEP * noise {
+        return OUT;
     }
     let left = (1.0 - PRICE * refuted / visible).max(0.0);
-    left * left.sqrt()
+    let price = LEAVING * ends.count as f32;
+    Against {
+        left: left * left.sqrt(),
+        price,
+    }
 }
 
 impl Around<'_> {
-    /// The level `BESIDE` pixels outside (`side` 1) or inside (-1) of a place `off` the outline.
+    /// The level `BESIDE` pixels outside (`side` 1) or inside (-1) of the outline.
     #[inline(always)]
-    fn beside(&self, ray: usize, off: f32, side: i32) -> f32 {
-        let place = self.reach as f32 + 0.5 + off + BESIDE * side as f32;
-        let row = (place + 0.5).max(0.0) as usize;
-        let mut sum = 0.0;
-        for shift in 0..=2 * self.half {
-            sum += self
-                .polar
-                .gray(row, (ray + RAYS + shift - self.half) % RAYS);
-        }
-        sum / (2 * self.half + 1) as f32
+    fn beside(&self, ray: usize, side: i32) -> f32 {
+        beside(self.polar, self.half, ray, side)
     }
 
     /// The weight of the rays from `begin` to `end` that refute the circle, and of those without
@@ -211,12 +226,9 @@ impl Around<'_> {
         begin: usize,
         end: usize,
     ) -> (f32, f32) {
-        let mut leaving = [false; RAYS];
-        let before = self.end(states, is_hit, (begin, end), 1, &mut leaving);
-        let behind = self.end(states, is_hit, (begin, end), -1, &mut leaving);
-        let excuses =
-            u8::from(before.excused && !before.leaves) + u8::from(behind.excused && !behind.leaves);
-        let weight = match excuses {
+        let before = self.end(states, is_hit, (begin, end), 1);
+        let behind = self.end(states, is_hit, (begin, end), -1);
+        let weight = match u8::from(before.excused) + u8::from(behind.excused) {
             0 => 1.0,
             1 => HALF_EXCUSED,
             _ => 0.0,
@@ -229,7 +241,7 @@ impl Around<'_> {
             if states[ray] == Ray::Beyond {
                 continue;
             }
-            if leaving[ray] {
+            if self.between >> ray & 1 == 1 {
                 refuted += 1.0;
             } else if self.is_plain(ray, before.levels, least)
                 || self.is_plain(ray, behind.levels, least)
@@ -254,13 +266,13 @@ impl Around<'_> {
             return false;
         }
         let slack = (0.25 * least).max(2.0 * self.level_noise);
-        let (inner, outer) = (self.beside(ray, 0.0, -1), self.beside(ray, 0.0, 1));
+        let (inner, outer) = (self.beside(ray, -1), self.beside(ray, 1));
         let both = |level: f32| (inner - level).abs() <= slack && (outer - level).abs() <= slack;
         both(levels.inner) || both(levels.outer)
     }
 
     /// Looks at the end of the gap that a part of the outline before it (`side` 1) or behind it
-    /// (-1) ends at, and marks the rays on which that part goes on off the circle.
+    /// (-1) ends at.
     #[inline(always)]
     fn end(
         &self,
@@ -268,43 +280,32 @@ impl Around<'_> {
         is_hit: &[bool; RAYS],
         (begin, end): (usize, usize),
         side: i32,
-        leaving: &mut [bool; RAYS],
     ) -> End {
         // The last ray of the part, and the way into the gap from there.
         let last = if side > 0 { begin + RAYS - 1 } else { end } % RAYS;
         let ray_at = |steps: i32| (last as i32 + side * steps).rem_euclid(RAYS as i32) as usize;
         let mut levels = Levels::default();
-        let (mut count, mut part, mut in_part) = (0, 0, true);
-        for back in 0..RAYS as i32 {
-            let ray = ray_at(-back);
-            in_part &= states[ray] == Ray::Near;
-            part += usize::from(in_part);
-            if is_hit[ray] {
-                levels.inner += self.beside(ray, 0.0, -1);
-                levels.outer += self.beside(ray, 0.0, 1);
-                count += 1;
-            }
-            if count == END && (!in_part || part >= LEAST_PART) {
-                break;
-            }
+        let hits = (0..RAYS as i32)
+            .map(|back| ray_at(-back))
+            .filter(|&ray| is_hit[ray]);
+        let mut count = 0.0;
+        for ray in hits.take(END) {
+            levels.inner += self.beside(ray, -1);
+            levels.outer += self.beside(ray, 1);
+            count += 1.0;
         }
-        levels.inner /= count as f32;
-        levels.outer /= count as f32;
-        let mut found = End {
+        levels.inner /= count;
+        levels.outer /= count;
+        End {
             levels,
             excused: states[ray_at(1)] == Ray::Beyond || self.is_junction(last, side, end - begin),
-            leaves: false,
-        };
-        if part >= LEAST_PART {
-            found.leaves = self.follow(last, side, end - begin, levels, states, leaving);
         }
-        found
     }
 
     /// The level `BESIDE` pixels inside (`beside` -1) or outside (1), so many rays from a ray.
     #[inline(always)]
     fn level(&self, ray: usize, steps: i32, beside: f32) -> f32 {
-        let row = (self.reach as f32 + 1.0 + BESIDE * beside) as usize;
+        let row = (0.5 * (self.polar.steps + 1) as f32 + BESIDE * beside) as usize;
         let ray = (ray as i32 + steps).rem_euclid(RAYS as i32) as usize;
         self.polar.gray(row, ray)
     }
@@ -359,81 +360,15 @@ impl Around<'_> {
                 })
             })
     }
+}
 
-    /// Follows the outline into the gap; returns `true` if it leaves the circle.
-    #[inline(always)]
-    fn follow(
-        &self,
-        last: usize,
-        side: i32,
-        rays: usize,
-        levels: Levels,
-        states: &[Ray; RAYS],
-        leaving: &mut [bool; RAYS],
-    ) -> bool {
-        let ray_at = |steps: i32| (last as i32 + side * steps).rem_euclid(RAYS as i32) as usize;
-        let slack = (0.25 * (levels.outer - levels.inner).abs()).max(2.0 * self.level_noise);
-        let reach = (0.05 * self.r).max(0.9);
-        let mut off = self.edges.distance[last];
-        let mut bend = 0.5 * (off - self.edges.distance[ray_at(-2)]);
-        let mut own = [false; RAYS];
-        let mut farthest = 0.0f32;
-        for steps in 1..=rays as i32 {
-            let ray = ray_at(steps);
-            if states[ray] == Ray::Beyond {
-                break;
-            }
-            let Some((place, slope)) = self.nearest_edge(ray, off + bend, reach) else {
-                break;
-            };
-            bend = 0.5 * (bend + place - off);
-            off = place;
-            farthest = farthest.max(off.abs());
-            let (inner, outer) = (self.beside(ray, off, -1), self.beside(ray, off, 1));
-            own[ray] = off.abs() > (0.05 * self.r).max(1.0)
-                && slope >= 0.5 * self.slope
-                && (inner - levels.inner).abs() <= slack
-                && (outer - levels.outer).abs() <= slack;
-        }
-        let leaves = farthest >= (0.1 * self.r).max(2.0) && own.iter().any(|&own| own);
-        if leaves {
-            for (leaving, own) in leaving.iter_mut().zip(own) {
-                *leaving |= own;
-            }
-        }
-        leaves
-    }
-
-    /// The edge of the outline's sign on a ray that is nearest to `wanted`, and its slope.
-    #[inline(always)]
-    fn nearest_edge(&self, ray: usize, wanted: f32, reach: f32) -> Option<(f32, f32)> {
-        let middle = self.reach as f32 + wanted;
-        let first = ((middle - reach).max(1.0)).ceil() as usize;
-        let slope = |step: usize| self.sign * self.polar.outward[step * RAYS + ray];
-        let mut best: Option<(f32, f32)> = None;
-        for step in first..self.polar.steps - 1 {
-            if step as f32 > middle + reach {
-                break;
-            }
-            let here = slope(step);
-            let (before, behind) = (slope(step - 1), slope(step + 1));
-            if here < 0.4 * self.slope || here > 2.5 * self.slope || here < before || here < behind
-            {
-                continue;
-            }
-            let bend = 2.0 * here - before - behind;
-            let top = if bend > 0.0 {
-                (0.5 * (behind - before) / bend).clamp(-0.5, 0.5)
-            } else {
-                0.0
-            };
-            let place = self.polar.distance(step as f32 + top);
-            if best.is_none_or(|(other, _)| (place - wanted).abs() < (other - wanted).abs()) {
-                best = Some((place, here));
-            }
-        }
-        best
-    }
+/// The level `BESIDE` pixels outside (`side` 1) or inside (-1) of an outline, averaged over `half`
+/// rays on either side.
+#[inline(always)]
+fn beside(polar: &Polar, half: usize, ray: usize, side: i32) -> f32 {
+    let row = (0.5 * (polar.steps + 1) as f32 + BESIDE * side as f32) as usize;
+    let levels = (0..=2 * half).map(|shift| polar.gray(row, (ray + RAYS + shift - half) % RAYS));
+    levels.sum::<f32>() / (2 * half + 1) as f32
 }
 
 /// Returns `true` if the outlines cross.

@@ -42,7 +42,7 @@ impl AContrario {
             // At last those that more speaks against, in the light of the circles that are there.
             if index >= count {
                 let crosses = |other: &Ring| refute::crosses(&proof.in_frame(), other);
-                if proof.left >= 1.0 || !self.reported.iter().any(crosses) {
+                if proof.against.is_none() || !self.reported.iter().any(crosses) {
                     continue;
                 }
                 let mut prover = Prover {
@@ -53,11 +53,12 @@ impl AContrario {
                     tests: 0.0,
                     proofs: &mut Vec::new(),
                 };
-                let left = prover.refute(&proof, &self.reported, &mut self.budget.looks);
-                if left <= proof.left {
+                let before = proof.certainty;
+                let looks = &mut self.budget.looks;
+                proof.weaken(prover.refute(&proof, &self.reported, looks));
+                if proof.certainty <= before {
                     continue;
                 }
-                proof.leave(left);
             }
             let proof = &proof;
             let score = proof.score();

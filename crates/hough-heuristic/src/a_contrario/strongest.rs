@@ -35,6 +35,8 @@ pub(super) struct Edges {
     pub(super) slope: [f32; RAYS],
     /// 1 where the outside is brighter, else -1.
     pub(super) sign: [f32; RAYS],
+    /// Tangent of the angle between the edge and the outline.
+    pub(super) slant: [f32; RAYS],
     /// The step of the window that the edge was found at, from 1 on; 0 where there is no edge.
     at: [i32; RAYS],
 }
@@ -47,6 +49,7 @@ impl Edges {
             distance,
             slope: [10.0; RAYS],
             sign: [1.0; RAYS],
+            slant: [0.0; RAYS],
             at: [1; RAYS],
         }
     }
@@ -74,6 +77,7 @@ impl Edges {
             distance: [0.0; RAYS],
             slope: [0.0; RAYS],
             sign: [1.0; RAYS],
+            slant: [0.0; RAYS],
             at: [0; RAYS],
         };
         for (block, at) in edges.at.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
@@ -114,6 +118,7 @@ impl Edges {
             edges.distance[ray] = polar.distance(place);
             edges.slope[ray] = here;
             edges.sign[ray] = 1f32.copysign(polar.outward[step * RAYS + ray]);
+            edges.slant[ray] = polar.along[step * RAYS + ray].abs() / here;
         }
         edges
     }
