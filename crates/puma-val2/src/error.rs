@@ -61,8 +61,8 @@ pub enum ArmError {
     },
     /// A program on the controller asks for values. It may move the arm by what it is answered.
     #[error(
-        "{port}: a program asks {question:?}: answer it at the controller's terminal, or connect \
-         with `abort_running_program`"
+        "{port}: a program asks {question:?}: answer it at the controller's terminal, stop it, or \
+         connect with `abort_running_program`"
     )]
     Asked {
         /// The line.
@@ -163,7 +163,7 @@ pub enum ArmError {
     },
     /// A motion was commanded, and the arm's position cannot be read any more. The commands that
     /// stop it have been sent if the line took them.
-    #[error("{port}: the outcome of a motion is not known: {cause}")]
+    #[error("{port}: the outcome of a motion is not known, the arm may be moving: {cause}")]
     Unconfirmed {
         /// The line.
         port: String,

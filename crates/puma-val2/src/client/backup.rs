@@ -2,9 +2,11 @@
 
 use std::collections::HashSet;
 
+use crate::client::dialogue::{last_line, shortened};
 use crate::client::programs::{check_line, name_of};
 use crate::client::reader::Ending;
 use crate::client::val2_client::Val2Client;
+use crate::client::wire::is_doubt;
 use crate::error::ArmError;
 use crate::kinematics::xyzoat::Xyzoat;
 use crate::transport::Transport;
@@ -154,7 +156,9 @@ impl<T: Transport> Val2Client<T> {
             }
         }
         for ((name, _), scratch) in programs.iter().zip(&scratch) {
-            self.put_in_place(name, scratch)?;
+            // A line that fails once, by Ctrl-C for instance, leaves no half of the programs.
+            let placed = self.put_in_place(name, scratch);
+            placed.or_else(|_| self.put_in_place(name, scratch))?;
         }
         Ok(())
     }
@@ -218,21 +222,49 @@ impl<T: Transport> Val2Client<T> {
     /// negative one stands for runs without end.
     ///
     /// # Errors
-    /// [`ArmError::Setting`] for a name that is not one line of printable characters; otherwise
-    /// errors of the line or the controller.
+    /// [`ArmError::Setting`] for a name that is not one line of printable characters;
+    /// [`ArmError::Asked`] if the program asks for values; [`ArmError::Unconfirmed`], the arm
+    /// stopped, if it is not known whether the program runs; otherwise errors of the line or the
+    /// controller.
     pub fn start(&mut self, program: &str, cycles: i32) -> Result<(), ArmError> {
         check_line("the name of a program", program)?;
         self.refuse_under_guard("a program")?;
         self.last_known = None;
-        let line = format!("EXECUTE {program},{cycles}");
-        let reply = self.say(&line)?;
-        self.without_message(&line, &reply)?;
+        let line = self.line_to_start(program, cycles)?;
+        let reply = match self.wire.exchange(&line, self.wire.config.patience()) {
+            Err(failed) if failed.maybe_done && is_doubt(&failed.error) => {
+                match self.wire.spoil() {
+                    Ok(reply) if reply.ending != Ending::Idle => reply,
+                    _ => return Err(self.lost(failed.error)),
+                }
+            }
+            Err(failed) if failed.maybe_done => return Err(self.lost(failed.error)),
+            other => {
+                let reply = other?;
+                self.without_message(&line, &reply)?;
+                reply
+            }
+        };
         if reply.ending == Ending::Question {
-            return Err(self
-                .wire
-                .garbled(&line, "a program that asks for nothing", &reply.text));
+            let port = self.wire.port();
+            let question = shortened(last_line(&reply.text));
+            return Err(ArmError::Asked { port, question });
         }
         Ok(())
+    }
+
+    /// Returns the values of a location, read until they are shown the same twice.
+    pub(crate) fn location(&mut self, name: &str) -> Result<[f64; 6], ArmError> {
+        check_line("the name of a location", name)?;
+        let line = format!("LISTL {name}");
+        let listed = self.listing(&line)?;
+        let found = listed.iter().find_map(|shown| {
+            let (of, values) = shown.trim().split_once(' ')?;
+            let values: Option<Vec<f64>> = values.split_whitespace().map(number).collect();
+            let values = values?.try_into().ok()?;
+            of.eq_ignore_ascii_case(name).then_some(values)
+        });
+        found.ok_or_else(|| self.wire.garbled(&line, "the location", &listed.join("\n")))
     }
 }
 

@@ -55,6 +55,7 @@ impl<T: Transport> Val2Client<T> {
         self.lacks_ppoint = false;
         self.frames = Default::default();
         self.speed = None;
+        self.wire.cancelled = false;
         self.wire.mode = Mode::Connecting;
         let outcome = self.find_prompt();
         self.wire.mode = Mode::Session;
@@ -73,27 +74,33 @@ impl<T: Transport> Val2Client<T> {
     /// controller understands it, then `ABORT`.
     ///
     /// # Errors
-    /// [`ArmError::Busy`] if the controller has not shown a prompt within 1.5 seconds: the arm may
-    /// be moving; [`ArmError::Line`] if the line did not take it.
+    /// [`ArmError::Busy`] if the controller has not shown a prompt within 1.5 seconds, or some more
+    /// on a line below 600 baud: the arm may be moving; [`ArmError::Asked`] if a program still asks
+    /// for values, on a controller without control characters; [`ArmError::Line`] if the line did
+    /// not take it.
     pub fn stop_on(transport: T, config: ClientConfig) -> Result<(), ArmError> {
         let waited = config
             .quiet
-            .saturating_mul(4)
+            .saturating_mul(20)
             .max(Duration::from_millis(1500));
         let mut wire = Wire::new(transport, config);
         wire.mode = Mode::Stopping;
         wire.send(STOP, "PANIC")?;
-        match wire.read_reply("PANIC", waited) {
-            Ok(reply) if reply.ending != Ending::Running => Ok(()),
-            Ok(_) => {
-                wire.send(b"ABORT\r", "ABORT")?;
-                wire.read_reply("ABORT", waited).map(drop)
+        let mut outcome = wire.read_reply("PANIC", waited);
+        if matches!(&outcome, Ok(reply) if reply.ending == Ending::Running) {
+            wire.send(b"ABORT\r", "ABORT")?;
+            outcome = wire.read_reply("ABORT", waited);
+        }
+        let port = wire.port();
+        match outcome {
+            Ok(reply) if reply.ending == Ending::Idle => Ok(()),
+            Ok(reply) if reply.ending == Ending::Question && !is_boot_question(&reply.text) => {
+                let question = shortened(last_line(&reply.text));
+                Err(ArmError::Asked { port, question })
             }
             Err(error @ ArmError::Line { .. }) => Err(error),
-            Err(_) => {
-                let port = wire.port();
-                Err(ArmError::Busy { port, waited })
-            }
+            Ok(reply) if reply.ending == Ending::Question => Ok(()),
+            _ => Err(ArmError::Busy { port, waited }),
         }
     }
 

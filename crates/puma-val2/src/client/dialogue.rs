@@ -30,7 +30,7 @@ pub(super) enum Mode {
 
 /// Deletes an open line, or spoils it where Ctrl-U is unknown, so that it cannot be carried out.
 /// Ctrl-Q comes first: a flipped bit can make a Ctrl-S, which holds all output.
-const SPOIL: &[u8] = b"\x11\x15!!\r";
+pub(crate) const SPOIL: &[u8] = b"\x11\x15!!\r";
 
 /// Returns the bytes that are sent after silence: the only ones that no caller has asked for.
 ///

@@ -3,7 +3,7 @@
 pub(crate) mod backup;
 pub(crate) mod config;
 pub(crate) mod connect;
-mod dialogue;
+pub(crate) mod dialogue;
 mod guarded;
 pub(crate) mod hand;
 pub(crate) mod motion;

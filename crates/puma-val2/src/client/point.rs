@@ -111,6 +111,29 @@ impl<T: Transport> Val2Client<T> {
         self.run(&line, limit).map(drop)
     }
 
+    /// Returns the line that starts a program of the user.
+    ///
+    /// Without an echo a damaged name could be that of another program. There a stored program,
+    /// whose listing has been compared, asks first and then calls it.
+    pub(super) fn line_to_start(&mut self, name: &str, cycles: i32) -> Result<String, ArmError> {
+        if self.wire.checks_echo() {
+            return Ok(format!("EXECUTE {name},{cycles}"));
+        }
+        let runs = if cycles < 0 {
+            vec![format!("20 CALL {name}"), "GOTO 20".to_owned()]
+        } else {
+            let first = format!("FOR PGI = 1 TO {cycles}");
+            vec![first, format!("CALL {name}"), "END".to_owned()]
+        };
+        self.goal_program = None;
+        self.type_program(GOAL, &asked_first(runs))?;
+        let line = format!("EXECUTE {GOAL}");
+        let patience = self.wire.config.patience();
+        let reply = self.wire.exchange_to_end(&line, patience)?;
+        self.shown(&line, &reply)?;
+        Ok(GO.to_owned())
+    }
+
     /// Returns the steps of a motion to a point, for a program.
     pub(super) fn steps_to_point(&self, motion: &str) -> Vec<String> {
         if self.wire.checks_echo() {
@@ -192,17 +215,23 @@ fn weighted(values: &[f64; 6]) -> f64 {
 /// damaged answer makes them ask again.
 fn shown_first(motion: &str) -> Vec<String> {
     let name = motion.rsplit(' ').next().unwrap_or_default();
-    [
-        &format!("DECOMPOSE PGQ[1] = {name}"),
-        "TYPE /F1.2,7*PGQ[1]+8*PGQ[2]+9*PGQ[3]+10*PGQ[4]+11*PGQ[5]+12*PGQ[6]",
-        &format!("10 PROMPT \"{RESIDENT_QUESTION}\",PGK"),
-        "IF PGK <> 7 AND PGK <> 914 GOTO 10",
-        "IF PGK == 7 THEN",
-        motion,
-        "END",
-    ]
-    .map(str::to_owned)
-    .to_vec()
+    let mut steps = vec![
+        format!("DECOMPOSE PGQ[1] = {name}"),
+        "TYPE /F1.2,7*PGQ[1]+8*PGQ[2]+9*PGQ[3]+10*PGQ[4]+11*PGQ[5]+12*PGQ[6]".to_owned(),
+    ];
+    steps.extend(asked_first(vec![motion.to_owned()]));
+    steps
+}
+
+/// Returns the steps that ask and carry out `steps` after [`GO`].
+fn asked_first(steps: Vec<String>) -> Vec<String> {
+    let question = [
+        format!("10 PROMPT \"{RESIDENT_QUESTION}\",PGK"),
+        "IF PGK <> 7 AND PGK <> 914 GOTO 10".to_owned(),
+        "IF PGK == 7 THEN".to_owned(),
+    ];
+    let end = ["END".to_owned()];
+    question.into_iter().chain(steps).chain(end).collect()
 }
 
 /// Returns the test of a display of the place `name` that was given these values.

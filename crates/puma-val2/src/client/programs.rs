@@ -125,6 +125,9 @@ impl<T: Transport> Val2Client<T> {
     pub(super) fn put_in_place(&mut self, name: &str, new: &str) -> Result<(), ArmError> {
         let known = self.programs()?;
         let is_there = |wanted: &str| known.iter().any(|name| name.eq_ignore_ascii_case(wanted));
+        if is_there(name) && !is_there(new) {
+            return Ok(());
+        }
         let mut old = OLD.to_owned();
         for number in 1.. {
             if !is_there(&old) {
@@ -273,9 +276,10 @@ impl<T: Transport> Val2Client<T> {
         check_line("the name of a program", program)?;
         self.refuse_under_guard("a program")?;
         self.last_known = None;
+        let line = self.line_to_start(program, 1)?;
         self.wire.mode = Mode::Program;
         let limit = self.wire.config.motion_timeout;
-        let outcome = self.run(&format!("EXECUTE {program}"), limit);
+        let outcome = self.run(&line, limit);
         self.wire.mode = Mode::Session;
         let Err(failed) = outcome else {
             return outcome.map_err(ArmError::from);

@@ -70,7 +70,7 @@ pub(super) struct Wire<T> {
     /// The start-up dialogue has been met since the monitor was last reached.
     pub(super) restarted: bool,
     /// The question of a program has been cancelled, and the program not yet been ended.
-    cancelled: bool,
+    pub(super) cancelled: bool,
 }
 
 impl<T: Transport> Wire<T> {

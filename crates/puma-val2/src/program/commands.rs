@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::client::{ClientConfig, Location, Val2Client};
 use crate::error::ArmError;
-use crate::joints::{Joint, Joints};
+use crate::joints::{Joint, JointDelta, Joints};
 use crate::kinematics::xyzoat::Xyzoat;
 use crate::manipulator::{Gripper, Manipulator};
 use crate::program::failure::Failure;
@@ -67,7 +67,10 @@ impl Command {
             Self::Jog { .. } => format!("The arm will move while a key is held{at}."),
             Self::Move { to, .. } => format!("The arm will move to {}{at}.", to.join(" ")),
             Self::Run { name, .. } => format!("Program {name} will run{at}."),
-            Self::Send { line } => format!("`{}` may move the arm.", line.join(" ")),
+            Self::Send { line } => format!(
+                "`{}` may move the arm, at the monitor's speed.",
+                line.join(" ")
+            ),
             _ => String::new(),
         }
     }
@@ -91,6 +94,10 @@ pub(super) fn check(globals: &Globals, command: &Command) -> Result<(), Failure>
                 "--hand takes six numbers, --straight a pose of the hand",
             ));
         }
+    }
+    if matches!(command, Command::Term) && !globals.yes && !io::stdin().is_terminal() {
+        let text = "Lines of a file or a pipe may move the arm: say --yes";
+        return Err(Failure::unconfirmed(text));
     }
     if command.moves() {
         confirm(globals, &command.motion())?;
@@ -161,7 +168,7 @@ pub(super) fn run(
             degrees: Some(by),
             ..
         } => {
-            client.drive(Joint::ALL[usize::from(*joint) - 1], by.to_radians(), 100.0)?;
+            turn(&mut client, Joint::ALL[usize::from(*joint) - 1], *by)?;
             show_where(globals, &client.where_()?)?;
         }
         Command::Jog { .. } => keys::jog(&mut client)?,
@@ -219,7 +226,7 @@ pub(super) fn run(
         Command::Backup { file } => {
             let text = client.backup()?;
             if file.as_os_str() == "-" {
-                io::stdout().write_all(text.as_bytes())?;
+                print(globals, &text, &json!({ "backup": text }))?;
             } else {
                 write_whole(file, text.as_bytes())?;
                 let lines = text.lines().count();
@@ -247,6 +254,12 @@ pub(super) fn run(
         }
         Command::Status => said(globals, &mut client, "STATUS")?,
         Command::Io => said(globals, &mut client, "IO")?,
+        Command::Send { .. } if command.moves() && !client.echoes() => {
+            return Err(Failure::usage(
+                "the controller echoes nothing, so that a damaged line could be another motion: \
+                 `move`, `jog` and `run` compare what has arrived",
+            ));
+        }
         Command::Send { line } => said(globals, &mut client, &line.join(" "))?,
         Command::Signal { number, state } => {
             let signed = i32::from(*number);
@@ -262,7 +275,7 @@ pub(super) fn run(
         Command::Stop | Command::Term | Command::Emulate(_) => {}
     }
     for notice in client.take_notices() {
-        eprintln!("note: {notice}");
+        let _ = writeln!(io::stderr(), "note: {notice}");
     }
     Ok(())
 }
@@ -272,6 +285,16 @@ fn numbers(words: &[String]) -> Result<[f64; 6], Failure> {
     let values: Option<Vec<f64>> = words.iter().map(number).collect();
     let six = values.and_then(|values| values.try_into().ok());
     six.ok_or_else(|| Failure::usage(format!("`{}` are not six numbers", words.join(" "))))
+}
+
+/// Turns one joint by an angle in degrees.
+pub(super) fn turn(client: &mut Client<'_>, joint: Joint, by: f64) -> Result<Joints, ArmError> {
+    let by = by.to_radians();
+    if client.echoes() {
+        client.drive(joint, by, 100.0)
+    } else {
+        client.move_by(JointDelta::of(joint, by))
+    }
 }
 
 fn go(client: &mut Client<'_>, to: &[String], hand: bool, straight: bool) -> Result<(), Failure> {
@@ -289,19 +312,7 @@ fn go(client: &mut Client<'_>, to: &[String], hand: bool, straight: bool) -> Res
         client.ready()?;
         return Ok(());
     }
-    let listed = client.send_line(&format!("LISTL {name}"))?;
-    let values = listed.lines().find_map(|line| {
-        let values: Option<Vec<f64>> = line
-            .split_whitespace()
-            .skip(1)
-            .map(|w| w.parse().ok())
-            .collect();
-        <[f64; 6]>::try_from(values?).ok()
-    });
-    let Some(values) = values else {
-        let text = format!("the controller knows no location {name}: {listed}");
-        return Err(Failure { text, code: 3 });
-    };
+    let values = client.location(name)?;
     if name.starts_with('#') {
         client.move_to(Joints::from_degrees(values))?;
     } else {

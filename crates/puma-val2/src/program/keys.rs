@@ -1,6 +1,6 @@
 //! Jogging by keys: the arm moves while a key is held.
 
-use crate::program::commands::Client;
+use crate::program::commands::{Client, turn};
 use crate::program::failure::Failure;
 
 /// Moves the arm as keys say until `q`.
@@ -19,11 +19,12 @@ pub(super) fn jog(client: &mut Client<'_>) -> Result<(), Failure> {
     }
     let keyboard = Keyboard::raw()?;
     let (mut joint, mut step) = (Joint::J1, 1.0_f64);
-    println!("1-6 joint, hold + or - to move, [ ] step, q ends\r");
+    let mut out = io::stdout();
+    writeln!(out, "1-6 joint, hold + or - to move, [ ] step, q ends\r")?;
     let mut stands = client.where_()?.joints;
     loop {
-        print!("{joint}  step {step} degrees  {stands}   \r");
-        io::stdout().flush()?;
+        write!(out, "{joint}  step {step} degrees  {stands}   \r")?;
+        out.flush()?;
         let key = keyboard.key()?;
         if client.line().is_interrupted() {
             // The caller stops the arm.
@@ -48,15 +49,14 @@ pub(super) fn jog(client: &mut Client<'_>) -> Result<(), Failure> {
             b'q' | 0x03 | 0x04 => break,
             _ => continue,
         };
-        match client.drive(joint, (sign * step).to_radians(), 100.0) {
+        match turn(client, joint, sign * step) {
             Ok(joints) => stands = joints,
             Err(_) if client.line().is_interrupted() => {}
-            Err(error) => println!("\r\n{error}\r"),
+            Err(error) => writeln!(out, "\r\n{error}\r")?,
         }
         keyboard.forget()?;
     }
-    println!("\r");
-    Ok(())
+    Ok(writeln!(out, "\r")?)
 }
 
 #[cfg(not(unix))]

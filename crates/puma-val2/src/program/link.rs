@@ -88,6 +88,8 @@ pub(super) fn with_line(globals: &Globals, command: &Command) -> Result<(), Fail
     if !matches!(command, Command::Term) {
         interrupted(SIGTERM)?;
         #[cfg(unix)]
+        interrupted(signal_hook::consts::SIGQUIT)?;
+        #[cfg(unix)]
         if !ignores_hangup() {
             interrupted(signal_hook::consts::SIGHUP)?;
         }

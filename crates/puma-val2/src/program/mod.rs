@@ -11,6 +11,7 @@ mod link;
 mod term;
 
 use std::ffi::OsString;
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -20,8 +21,9 @@ use crate::program::failure::Failure;
 
 const EXIT_CODES: &str = "\
 The controller is named by --port or --tcp, or by the variable VAL2_PORT. Commands that move the arm
-ask first, unless --yes, and set the monitor's speed to 10 %, unless --speed. A motion is stopped by
-Ctrl-C, by SIGTERM, and by a terminal that closes (SIGHUP, unless the program runs by nohup).
+ask first, unless --yes; `jog`, `move` and `run` set the monitor's speed to 10 %, unless --speed,
+and the others keep it. A motion is stopped by Ctrl-C, Ctrl-\\, SIGTERM, and by a terminal that
+closes (SIGHUP, unless the program runs by nohup).
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 refused by the controller, 4 the line failed or no
 VAL monitor answers, 5 not confirmed, 6 the arm may be moving: press the emergency stop,
@@ -225,14 +227,13 @@ pub fn val2(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     if failure.text.is_empty() {
         return ExitCode::from(failure.code);
     }
-    if globals.json {
-        eprintln!(
-            "{}",
-            serde_json::json!({"error": failure.text, "exit_code": failure.code})
-        );
+    let text = if globals.json {
+        serde_json::json!({"error": failure.text, "exit_code": failure.code}).to_string()
     } else {
-        eprintln!("error: {}", failure.text);
-    }
+        format!("error: {}", failure.text)
+    };
+    // The terminal may be closed.
+    let _ = writeln!(std::io::stderr(), "{text}");
     ExitCode::from(failure.code)
 }
 

@@ -5,6 +5,7 @@ use std::sync::mpsc::{self, TryRecvError};
 use std::time::Duration;
 
 use crate::client::ClientConfig;
+use crate::client::dialogue::SPOIL;
 use crate::client::reader::ReplyReader;
 use crate::program::failure::Failure;
 use crate::program::link::Link;
@@ -28,13 +29,10 @@ pub(super) fn run(link: &mut Link, config: &ClientConfig) -> Result<(), Failure>
     }
     let reader = || ReplyReader::new(4096, config.idle_prompt, config.run_prompt);
     let mut said = reader();
-    // Asks for the prompt, without ending a line that somebody has begun.
-    let ask: &[u8] = if config.control_characters {
-        b"\x11\x15\r"
-    } else {
-        b"\r"
-    };
-    link.send(ask)?;
+    // Asks for the prompt. An empty line would end a line that somebody has begun, or be the answer
+    // to a program's question.
+    let skipped = if config.control_characters { 0 } else { 2 };
+    link.send(&SPOIL[skipped..])?;
     let mut buffer = [0; 512];
     let mut ended = false;
     loop {

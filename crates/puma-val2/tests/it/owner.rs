@@ -236,7 +236,7 @@ fn programs_run_in_the_background_or_to_their_end() {
 fn a_terminal_waits_for_the_prompt_between_the_lines_of_a_file() {
     let bench = Bench::new(&["--profile", "val2_hardware"]);
     let mut term = bench
-        .command(&["term"])
+        .command(&["--yes", "term"])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn();
@@ -262,19 +262,58 @@ fn a_terminal_waits_for_the_prompt_between_the_lines_of_a_file() {
 }
 
 #[test]
-fn ctrl_c_in_mid_move_stops_the_arm() {
+fn signals_that_end_a_program_stop_the_arm_in_mid_move() {
     let bench = Bench::new(&["--realtime"]);
     bench.says(&["--yes", "calibrate"]);
-    let child = bench.moving();
-    kill_process(Pid::from_child(&child), Signal::INT).unwrap();
-    let output = child.wait_with_output().unwrap();
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(130), "{errors}");
-    assert!(errors.contains("the arm has been stopped"), "{errors}");
-    let stands = bench.joints();
-    assert!((1.0..40.0).contains(&stands[0]), "{stands:?}");
-    assert_eq!(bench.joints(), stands);
+    for signal in [Signal::INT, Signal::QUIT] {
+        let from = bench.joints()[0];
+        let child = bench.moving();
+        kill_process(Pid::from_child(&child), signal).unwrap();
+        let output = child.wait_with_output().unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(130), "{errors}");
+        assert!(errors.contains("the arm has been stopped"), "{errors}");
+        let stands = bench.joints();
+        assert!((1.0..40.0).contains(&(stands[0] - from)), "{stands:?}");
+        assert_eq!(bench.joints(), stands);
+    }
     bench.says(&["--yes", "jog", "1", "-1"]);
+}
+
+const ASKING: &str = ".PROGRAM ASK\n PROMPT \"HOW FAR? \",X\n DRIVE 1,X+10,50\n.END\n";
+
+#[test]
+fn a_terminal_answers_no_question_of_a_program() {
+    for profile in ["val2", "val2_strict_miz"] {
+        let mut bench = Bench::new(&["--profile", profile]);
+        let call = |bench: &Bench, code, words: &[&str]| {
+            let mut all = vec!["--profile", profile, "--yes"];
+            all.extend(words);
+            bench.fails(code, &all)
+        };
+        bench.says(&["--profile", profile, "--yes", "calibrate"]);
+        bench.write("ask.v2", ASKING);
+        bench.says(&["--profile", profile, "put", "ask.v2"]);
+        let errors = call(&bench, 3, &["run", "ASK"]);
+        assert!(errors.contains("asks \"HOW FAR?\""), "{errors}");
+        bench.says(&["--profile", profile, "--yes", "term"]);
+        call(&bench, 3, &["where"]);
+        assert!(bench.arm()[0].abs() < 0.01);
+        if profile == "val2" {
+            assert_eq!(bench.says(&["stop"]), "stopped\n");
+        } else {
+            // Without Ctrl-C the question stays.
+            let errors = call(&bench, 3, &["stop"]);
+            assert!(errors.contains("a program asks"), "{errors}");
+        }
+        assert!(bench.arm()[0].abs() < 0.01);
+    }
+}
+
+#[test]
+fn lines_of_a_pipe_need_a_yes() {
+    let bench = Bench::new(&[]);
+    assert!(bench.fails(5, &["term"]).contains("say --yes"));
 }
 
 #[test]

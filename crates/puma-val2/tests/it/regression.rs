@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::faults::line::{Damage, FaultyLine, Way};
 use puma_val2::{
     ArmError, ClientConfig, Emulator, Joint, Joints, Manipulator, MemoryLine, Profile, PumaParams,
     Val2Client,
@@ -53,6 +54,104 @@ fn a_running_program_and_the_speed_survive_a_connection() {
     );
     assert_matches!(client.ready(), Err(ArmError::Refused { .. }));
     assert!(client.line().emulator().moving());
+}
+
+const PICKS: &str = ".PROGRAM PICK1\n MOVE #PPOINT(10,-90,90)\n.END\n\
+    .PROGRAM PICK3\n MOVE #PPOINT(99,-90,90)\n.END\n";
+
+/// A client of a controller that holds the programs of [`PICKS`], on a line that can be damaged.
+fn picking(echo: bool) -> Val2Client<FaultyLine> {
+    let profile = Profile {
+        echo,
+        ..Profile::val2()
+    };
+    let mut line = FaultyLine::new(Emulator::new(PumaParams::unimation(), profile.clone()));
+    line.inner = line_after(profile, "");
+    line.inner.emulator_mut().load_text(PICKS).unwrap();
+    Val2Client::connect(line, ClientConfig::for_emulator()).unwrap()
+}
+
+#[test]
+fn a_damaged_name_starts_no_other_program_without_an_echo() {
+    for at in 0.. {
+        let mut client = picking(false);
+        // The 1 of PICK1 becomes a 3.
+        client
+            .line_mut()
+            .strike(Way::ToController, at, Damage::Flipped(1));
+        let outcome = if at % 2 == 0 {
+            client.execute("PICK1").map(drop)
+        } else {
+            client.start("PICK1", 1)
+        };
+        let struck = client.line().struck;
+        client.line_mut().heal();
+        if outcome.is_ok() {
+            while client.line().inner.emulator().moving() {
+                client.joints().unwrap();
+            }
+        }
+        let waist = client.line().inner.emulator().joints().degrees()[0];
+        assert!(waist < 10.1, "character {at}: {waist} after {outcome:?}");
+        if !struck {
+            assert!(waist > 9.9, "{outcome:?}");
+            break;
+        }
+    }
+}
+
+#[test]
+fn a_program_that_may_run_is_reported_as_such() {
+    let mut client = picking(true);
+    // The end of the line is heard, nothing more.
+    let line = client.line_mut();
+    line.strike(
+        Way::FromController,
+        "EXECUTE PICK1,1 \r\n".len(),
+        Damage::Cut,
+    );
+    let outcome = client.start("PICK1", 1);
+    assert_matches!(outcome, Err(ArmError::Unconfirmed { .. }));
+    assert!(outcome.unwrap_err().to_string().contains("may be moving"));
+}
+
+#[test]
+fn a_line_that_fails_once_leaves_no_half_of_the_programs() {
+    let new = PICKS.replace("90)", "80)");
+    let (mut old_ones, mut new_ones) = (0, 0);
+    for number in (0..).step_by(7) {
+        let mut client = picking(true);
+        client.line_mut().fails_once = Some(number);
+        let outcome = client.restore(&new, true);
+        let spent = client.line().fails_once.is_none();
+        client.line_mut().fails_once = None;
+        client.reconnect().unwrap();
+        let [one, three] = ["PICK1", "PICK3"].map(|name| client.program(name).unwrap());
+        let is_new = |steps: &[String]| steps[0].contains("80)");
+        assert_eq!(
+            is_new(&one),
+            is_new(&three),
+            "receipt {number}: {outcome:?}"
+        );
+        assert!(is_new(&one) || outcome.is_err());
+        assert_eq!(
+            client.programs().unwrap(),
+            ["PICK1", "PICK3"],
+            "receipt {number}"
+        );
+        *(if is_new(&one) {
+            &mut new_ones
+        } else {
+            &mut old_ones
+        }) += 1;
+        if !spent {
+            break;
+        }
+    }
+    assert!(
+        old_ones > 5 && new_ones > 5,
+        "{old_ones} old, {new_ones} new"
+    );
 }
 
 #[test]

@@ -86,6 +86,8 @@ pub(crate) struct FaultyLine {
     pub(crate) noise: Option<Noise>,
     pub(crate) counted: [usize; 2],
     pub(crate) closed: bool,
+    /// Number of receipts until one fails, once.
+    pub(crate) fails_once: Option<usize>,
     pub(crate) cut: bool,
     pub(crate) struck: bool,
     /// The first of these texts that comes from the controller is made the second.
@@ -105,6 +107,7 @@ impl FaultyLine {
             noise: None,
             counted: [0; 2],
             closed: false,
+            fails_once: None,
             cut: false,
             struck: false,
             forge: None,
@@ -181,6 +184,13 @@ impl Transport for FaultyLine {
     }
 
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<usize>> {
+        self.fails_once = match self.fails_once {
+            Some(0) => {
+                self.fails_once = None;
+                return Err(io::ErrorKind::Interrupted.into());
+            }
+            left => left.map(|count| count - 1),
+        };
         if self.closed {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }

@@ -13,6 +13,6 @@ mod field;
 mod guard;
 mod hand;
 mod harness;
-mod line;
+pub(crate) mod line;
 mod resident;
 mod used;
