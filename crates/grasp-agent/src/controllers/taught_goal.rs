@@ -63,6 +63,11 @@ impl TaughtGoal {
         self.taught
     }
 
+    /// Returns the features at the goal that this one replaces.
+    pub(crate) fn untaught(&self) -> Features {
+        self.untaught
+    }
+
     /// Returns the pose that they were seen from.
     pub fn seen_from(&self) -> Joints {
         self.from

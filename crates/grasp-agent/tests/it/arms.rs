@@ -159,6 +159,26 @@ fn from_a_joint_at_its_limit_every_ball_is_reached() {
     assert!(held == 8 && moves < 64, "{held} of 8, {moves}");
 }
 
+/// Balls and lenses with which the goal has a radius of 21 to 82 units.
+#[test]
+fn goals_of_other_sizes_are_reached() {
+    for (ball, lens) in [
+        (0.036, 1.0),
+        (0.048, 1.0),
+        (0.013, 1.0),
+        (0.020, 0.7),
+        (0.020, 1.9),
+    ] {
+        let mut site = Site::puma();
+        site.nominal.ball_radius = ball;
+        site.nominal.focal *= lens;
+        let plant = Plant::at(site.clone(), MODERATE, Odd::default(), 6);
+        let radius = plant.taught().map(|goal| goal.features().r);
+        let (held, moves) = held(&site, MODERATE, 6, 4);
+        assert!(held == 4 && moves < 40, "{radius:?}: {held} of 4, {moves}");
+    }
+}
+
 /// An arm whose third joint does not move.
 struct Stuck(Joints);
 

@@ -344,7 +344,7 @@ impl State {
         };
         let seen = (0.0..Features::WIDTH).contains(&x)
             && (0.0..Features::HEIGHT).contains(&f.y)
-            && (5.0..68.0).contains(&f.r);
+            && (5.0..100.0).contains(&f.r);
         seen.then_some(Features { x, ..f })
     }
 
