@@ -163,7 +163,8 @@ impl AgentConfig {
     }
 
     /// Returns the settings with a goal that was shown on the arm, and its grip. `left_behind` is
-    /// scaled by the radius at the goal, and `approach_radius` is at least a quarter more than that.
+    /// scaled by the radius at the goal, and `approach_radius` is at least a quarter more than
+    /// that.
     #[must_use]
     pub fn with_taught_goal(self, goal: &TaughtGoal) -> Self {
         let [before, now] = [goal.untaught().r, goal.features().r];

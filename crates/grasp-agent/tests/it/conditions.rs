@@ -126,8 +126,8 @@ struct Causes {
     runs: usize,
 }
 
-/// Plays `balls` in each of `cells`, with the goal taught if `shown`. A camera that slips does so at
-/// the sixth ball.
+/// Plays `balls` in each of `cells`, with the goal taught if `shown`. A camera that slips does so
+/// at the sixth ball.
 fn play(level: Level, condition: &Condition, cells: u64, balls: u64, shown: bool) -> Causes {
     let (_, set, right) = condition;
     let first: u64 = std::env::var("GRASP_SEED").map_or(3000, |seed| seed.parse().unwrap());

@@ -94,8 +94,8 @@ fn held<S: FrameSource>(
     held
 }
 
-/// `GRASP_CELLS=8 cargo test --release -p grasp-agent --test it -- queue --nocapture` plays 20 balls
-/// in each of 8 cells.
+/// `GRASP_CELLS=8 cargo test --release -p grasp-agent --test it -- queue --nocapture` plays 20
+/// balls in each of 8 cells.
 #[test]
 fn the_newest_frames_of_a_queue_are_enough() {
     let cells = std::env::var("GRASP_CELLS").ok();
