@@ -37,20 +37,24 @@ impl FrozenCheck {
         frame: Option<&GrayImage>,
         ball: Option<&Sighting>,
     ) -> bool {
-        /// Least turn of one of the first three joints that changes the image, radians.
-        const A_MOVE: f64 = 0.002;
+        /// Least turns of one of the first three joints that change a frame, and features that a
+        /// detector may round, radians.
+        const A_MOVE: [f64; 2] = [0.002, 0.03];
         let unchanged = match (frame, ball, &self.shown) {
             (Some(frame), _, Some(Shown::Frame(shown))) => frame == shown,
             (None, Some(ball), Some(Shown::Ball(shown))) => ball.features == *shown,
             // A ball that is not seen can be anywhere.
             _ => false,
         };
-        let moved = (0..3).any(|i| (joints.0[i] - self.from.0[i]).abs() > A_MOVE);
+        let least = A_MOVE[usize::from(frame.is_none())];
+        let moved = (0..3).any(|i| (joints.0[i] - self.from.0[i]).abs() > least);
         let same = moved && unchanged;
         if moved {
             self.same = if same { self.same.saturating_add(1) } else { 0 };
         }
-        self.from = *joints;
+        if moved || !unchanged {
+            self.from = *joints;
+        }
         if !unchanged {
             self.show(frame, ball);
         }

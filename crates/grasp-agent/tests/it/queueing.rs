@@ -53,7 +53,6 @@ struct Through<S> {
 impl<S: FrameSource> Eye for Through<S> {
     fn look(&mut self) -> Result<Option<Sighting>, FrameError> {
         let seen = self.plant.look()?.map(|ball| ball.features);
-        *self.scene.lock().unwrap() = seen;
         // The arm was moving, and the queue has filled.
         std::thread::sleep(Duration::from_millis(8));
         *self.scene.lock().unwrap() = seen;
@@ -94,7 +93,7 @@ fn held<S: FrameSource>(
     held
 }
 
-/// `GRASP_CELLS=8 cargo test --release -p grasp-agent --test it -- queue --nocapture` plays 20
+/// `GRASP_CELLS=8 cargo test --release -p grasp-agent --test it -- newest --nocapture` plays 20
 /// balls in each of 8 cells.
 #[test]
 fn the_newest_frames_of_a_queue_are_enough() {
