@@ -350,7 +350,8 @@ impl Contents {
         let mut contents = Self::default();
         let mut section = String::new();
         let mut names = HashSet::new();
-        for (index, line) in text.lines().enumerate() {
+        // Files of DOS end with Ctrl-Z.
+        for (index, line) in text.trim_end_matches('\x1a').lines().enumerate() {
             let line = line.trim();
             let upper = line.to_ascii_uppercase();
             let wrong = |problem| ArmError::Text {

@@ -99,6 +99,9 @@ pub(super) fn check(globals: &Globals, command: &Command) -> Result<(), Failure>
         let text = "Lines of a file or a pipe may move the arm: say --yes";
         return Err(Failure::unconfirmed(text));
     }
+    if let Command::Rm { name } = command {
+        confirm(globals, &format!("{name} will be deleted."))?;
+    }
     if command.moves() {
         confirm(globals, &command.motion())?;
     }
@@ -219,7 +222,6 @@ pub(super) fn run(
             show_plan(globals, &plan.map_err(|error| in_file(file, error))?)?;
         }
         Command::Rm { name } => {
-            confirm(globals, &format!("{name} will be deleted."))?;
             client.remove(name)?;
             done(globals, &format!("{name} deleted"))?;
         }
@@ -398,7 +400,7 @@ fn restore(globals: &Globals, client: &mut Client<'_>, file: &Path) -> Result<()
             )));
         }
         let what = format!("{port} holds other contents of {names}, to be replaced.");
-        confirm(globals, &what)?;
+        client.line().asking(|| confirm(globals, &what))?;
         outcome = client.restore(&text, true);
     }
     let plan = outcome.map_err(|error| in_file(file, error))?;

@@ -25,6 +25,8 @@ const INTERRUPTED: &str = "interrupted by a signal";
 pub(super) struct Link {
     line: Box<dyn Transport>,
     interrupted: Arc<AtomicBool>,
+    /// A person is asked: signals end the program at once.
+    asking: Arc<AtomicBool>,
     failed: Cell<bool>,
 }
 
@@ -33,6 +35,14 @@ impl Link {
     #[cfg(unix)]
     pub(super) fn is_interrupted(&self) -> bool {
         self.interrupted.load(Ordering::Acquire) || self.failed.get()
+    }
+
+    /// Carries out a call that asks a person. No reply of the controller is awaited in it.
+    pub(super) fn asking<R>(&self, ask: impl FnOnce() -> R) -> R {
+        self.asking.store(true, Ordering::Release);
+        let answer = ask();
+        self.asking.store(false, Ordering::Release);
+        answer
     }
 
     /// Returns `true` once for each signal.
@@ -82,7 +92,11 @@ pub(super) fn with_line(globals: &Globals, command: &Command) -> Result<(), Fail
         },
         _ => failure,
     })?;
-    let interrupted = |signal| signal_hook::flag::register(signal, Arc::clone(&link.interrupted));
+    let interrupted = |signal| {
+        #[cfg(unix)]
+        signal_hook::flag::register_conditional_default(signal, Arc::clone(&link.asking))?;
+        signal_hook::flag::register(signal, Arc::clone(&link.interrupted))
+    };
     interrupted(SIGINT)?;
     // A terminal ends by the others at once; a Ctrl-C there is for the controller.
     if !matches!(command, Command::Term) {
@@ -170,6 +184,7 @@ fn open(globals: &Globals) -> Result<Link, Failure> {
     Ok(Link {
         line,
         interrupted: Arc::default(),
+        asking: Arc::default(),
         failed: Cell::new(false),
     })
 }

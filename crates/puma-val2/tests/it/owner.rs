@@ -403,6 +403,31 @@ fn keys_move_the_arm_only_while_they_come() {
 }
 
 #[test]
+fn ctrl_c_at_a_question_ends_the_call_and_changes_nothing() {
+    let bench = Bench::new(&[]);
+    // A file of DOS.
+    bench.write("go.v2", &format!("{}\x1a", PROGRAM.replace('\n', "\r\n")));
+    bench.says(&["put", "go.v2"]);
+    bench.write("other.v2", &PROGRAM.replace("hello", "bye"));
+    for words in [&["put", "other.v2"][..], &["rm", "GO"]] {
+        let (_keys, terminal) = keyboard();
+        let mut call = bench.command(words);
+        let mut child = call.stdin(terminal).stderr(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(1500));
+        kill_process(Pid::from_child(&child), Signal::INT).unwrap();
+        std::thread::sleep(Duration::from_millis(300));
+        let ended = child.try_wait().unwrap();
+        let _ = child.kill();
+        let _ = child.wait();
+        assert!(
+            ended.is_some_and(|status| status.code().is_none()),
+            "{ended:?}"
+        );
+    }
+    assert!(bench.says(&["get", "GO"]).contains("hello"));
+}
+
+#[test]
 fn output_that_nobody_reads_ends_the_program_quietly() {
     let bench = Bench::new(&[]);
     let mut watch = bench.command(&["where", "--watch"]);
