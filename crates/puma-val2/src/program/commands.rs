@@ -34,12 +34,13 @@ impl Command {
     /// Returns `true` if the arm may move.
     pub(super) fn moves(&self) -> bool {
         let by_line = |line: &[String]| {
-            let word = line.join(" ").trim().to_ascii_uppercase();
-            let word = word.split([' ', ',']).next().unwrap_or_default().to_owned();
+            let line = line.join(" ").trim().to_ascii_uppercase();
+            let mut words = line.split(|c: char| !c.is_ascii_alphabetic());
+            let word = words.next().unwrap_or_default();
             let moving = ["DO", "CALIBRATE", "EXECUTE", "PROCEED", "RETRY", "NEXT"];
             moving
                 .iter()
-                .any(|m| !word.is_empty() && m.starts_with(&word))
+                .any(|m| !word.is_empty() && m.starts_with(word))
         };
         match self {
             Self::Calibrate | Self::Hand { .. } => true,

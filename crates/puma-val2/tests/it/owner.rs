@@ -314,6 +314,11 @@ fn a_terminal_answers_no_question_of_a_program() {
 fn lines_of_a_pipe_need_a_yes() {
     let bench = Bench::new(&[]);
     assert!(bench.fails(5, &["term"]).contains("say --yes"));
+    assert!(
+        bench
+            .fails(5, &["send", "PROCEED;on"])
+            .contains("say --yes")
+    );
 }
 
 #[test]
