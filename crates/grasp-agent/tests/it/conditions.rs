@@ -89,12 +89,7 @@ const JUDGED: &[Condition] = &[
 ];
 
 /// Conditions that are tried without `GRASP_CELLS`.
-const FEW: [&str; 4] = [
-    "mirrored",
-    "dead zone 1.5",
-    "upside down",
-    "three looks late",
-];
+const FEW: [&str; 3] = ["mirrored", "upside down", "three looks late"];
 
 /// Other values, on which nothing was set.
 const FRESH: &[Condition] = &[
