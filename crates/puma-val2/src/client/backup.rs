@@ -254,6 +254,7 @@ impl<T: Transport> Val2Client<T> {
     }
 
     /// Returns the values of a location, read until they are shown the same twice.
+    #[cfg(feature = "cli")]
     pub(crate) fn location(&mut self, name: &str) -> Result<[f64; 6], ArmError> {
         check_line("the name of a location", name)?;
         let line = format!("LISTL {name}");
