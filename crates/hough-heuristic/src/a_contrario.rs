@@ -28,6 +28,7 @@ mod refute;
 mod report;
 mod rings;
 mod search;
+mod small;
 mod stages;
 mod strongest;
 mod thin;

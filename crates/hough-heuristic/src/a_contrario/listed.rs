@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 use super::directions::UnitCircle;
 use super::level::Level;
 use super::polar::{Gray, Ring};
-use super::search::{self, Outline};
+use super::search::Outline;
+use super::small;
 use super::thin::Thinning;
 use crate::clock;
 use crate::edges::{Candidate, Maxima};
@@ -79,10 +80,13 @@ impl Edges {
             self.level.fill(0, 0, &[]);
             return;
         }
-        if let Some((outline, mirror_slack)) = asked {
+        let time = deadline.and_then(|time| time.checked_sub(3 * self.listing));
+        if let Some((outline, mirror_slack)) = asked
+            && !clock::is_past(time)
+        {
             // Small outlines are dense: all of their points are needed.
             self.level.fill(size.0, size.1, points);
-            self.small = search::shows_small(outline, &self.level, mirror_slack);
+            self.small = small::shows_small(outline, &self.level, mirror_slack, time);
         }
         let kept = self.thinning.strongest(points, size);
         self.thinned = kept.len() < points.len();

@@ -9,7 +9,6 @@ use super::level::{EDGE, Level};
 use super::partners::{LEAST_ALONG, PARTNERS};
 use super::polar::{LANES, Ring, whole};
 use super::prover::Prover;
-use crate::edges::{Vectorized, widest};
 
 /// Points of a circle's outline that are looked at.
 pub(super) const LOOKS: usize = 32;
@@ -22,15 +21,6 @@ const START: Start = Start {
     share: 0.44,
     reach: [3.0, 2.0],
 };
-
-/// Radii of outlines that are small at a size, pixels.
-const SMALL_RADII: (f32, f32) = (1.8, 4.2);
-/// Share of a small outline that must lie on edges.
-const SMALL_SHARE: f32 = 0.8;
-/// Number of pairs of points on small outlines that are worth a search of the next larger size, and
-/// one in so many of the edge points: texture has some by chance.
-const SEEN: usize = 4;
-const SEEN_SHARE: usize = 40;
 
 /// Edges along the outline of a ring.
 #[derive(Clone, Copy, Debug, Default)]
@@ -426,52 +416,6 @@ impl Search<'_> {
             &mut budget.looks,
         );
         true
-    }
-}
-
-/// Returns `true` if a size shows so many small closed outlines that the next larger is worth a
-/// search.
-pub(super) fn shows_small(outline: &Outline, level: &Level, mirror_slack: f32) -> bool {
-    widest(Small {
-        outline,
-        level,
-        mirror_slack,
-    })
-}
-
-/// The count of small closed outlines.
-struct Small<'a> {
-    outline: &'a Outline,
-    level: &'a Level,
-    mirror_slack: f32,
-}
-
-impl Vectorized for Small<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run(self) -> bool {
-        let (level, lines) = (self.level, &self.level.rows);
-        let mut rings = [Ring::default(); PARTNERS];
-        let enough = SEEN.max(level.free.len() / SEEN_SHARE);
-        let (mut seen, mut looks) = (0, 0);
-        for line in 0..level.height {
-            let points = level.line(false, line);
-            let end = points.end;
-            for at in points.filter(|&at| lines.nx[at].abs() >= LEAST_ALONG) {
-                let (radii, slack) = (SMALL_RADII, self.mirror_slack);
-                let count =
-                    lines.partners((at, end), radii, slack, &level.free, &mut rings, &mut looks);
-                for ring in &rings[..count] {
-                    let support = self.outline.support(level, ring, SMALL_SHARE, &mut looks);
-                    seen += usize::from(support.is_some());
-                }
-                if seen >= enough {
-                    return true;
-                }
-            }
-        }
-        false
     }
 }
 
