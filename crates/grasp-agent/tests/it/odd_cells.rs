@@ -175,22 +175,30 @@ const WAYS: [[[f64; 3]; 2]; 6] = [
     [[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]],
 ];
 
-/// `GRASP_CELLS=8` slips in 8 cells, in all ways.
+/// `GRASP_CELLS=8` slips in 8 cells, in all ways, and turns the lens.
 #[test]
 fn a_camera_that_slips_is_learned_anew() {
+    let none = Odd::default();
+    let slips = WAYS.map(|to| Odd {
+        slip: 1.0,
+        slip_to: Some(to),
+        ..none
+    });
+    let lenses = [-0.25, 0.15].map(|lens| Odd { lens, ..none });
     let cells = std::env::var("GRASP_CELLS").ok();
-    let ways = if cells.is_some() { 6 } else { 1 };
+    let tried: Vec<Odd> = match cells {
+        Some(_) => slips.into_iter().chain(lenses).collect(),
+        None => vec![slips[0], lenses[0]],
+    };
     let cells = cells.map_or(1, |cells| cells.parse().unwrap());
     let mut late = Vec::new();
-    for (way, to) in WAYS[..ways].iter().enumerate() {
+    for (way, odd) in tried.iter().enumerate() {
         for cell in 0..cells {
-            let plant = Plant::new(MODERATE, Odd::default(), 7 + cell);
+            let plant = Plant::new(MODERATE, none, 7 + cell);
             let mut agent = taught(&plant).unwrap();
             let mut run = |ball| plant.run(&mut agent, ball, &mut EventLog::default()).1;
             (0..20).for_each(|ball| _ = run(ball));
-            let mut odd = plant.0.borrow().odd;
-            (odd.slip, odd.slip_to) = (1.0, Some(*to));
-            plant.0.borrow_mut().odd = odd;
+            plant.0.borrow_mut().odd = *odd;
             let held: Vec<bool> = (20..50).map(&mut run).collect();
             let last = held
                 .iter()
@@ -202,6 +210,24 @@ fn a_camera_that_slips_is_learned_anew() {
         }
     }
     assert!(late.is_empty(), "{late:?}");
+}
+
+/// `GRASP_CELLS=8` warms 8 cells.
+#[test]
+fn a_lens_that_drifts_is_followed() {
+    let cells = std::env::var("GRASP_CELLS").map_or(1, |cells| cells.parse().unwrap());
+    for cell in 0..cells {
+        let plant = Plant::new(MODERATE, Odd::default(), 7 + cell);
+        let mut agent = taught(&plant).unwrap();
+        let held = (0..40).map(|ball| {
+            plant.0.borrow_mut().odd.lens = 0.15 * (ball.min(25) as f64) / 25.0;
+            plant.run(&mut agent, ball, &mut EventLog::default()).1
+        });
+        let held: Vec<bool> = held.collect();
+        let missed = |held: &[bool]| held.iter().filter(|held| !**held).count();
+        println!("cell {cell}: {} of 40 missed", missed(&held));
+        assert_eq!(missed(&held[30..]), 0, "cell {cell}: {held:?}");
+    }
 }
 
 #[test]

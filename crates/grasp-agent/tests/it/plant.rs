@@ -67,6 +67,8 @@ pub(crate) struct Odd {
     /// degrees, and the signs of both about the axes of the camera.
     pub(crate) slip: f64,
     pub(crate) slip_to: Option<[[f64; 3]; 2]>,
+    /// Share by which the focal length is larger from now on.
+    pub(crate) lens: f64,
 }
 
 /// Errors of camera, ball and play: share of the focal length, degrees of the axes, degrees of
@@ -317,6 +319,7 @@ impl State {
     fn view(&self, stand: &Joints) -> Option<Features> {
         let slip = self.odd.slip;
         let mut model = self.truth;
+        model.focal *= 1.0 + self.odd.lens;
         if slip > 0.0 {
             let to = self
                 .odd

@@ -179,9 +179,9 @@ impl Belief {
         self.widened(&(prior.deviations() * share), 0..end)
     }
 
-    /// Returns the belief after a slip of the camera in its mount.
+    /// Returns the belief after a slip of the camera in its mount, or a turn of its lens.
     pub(crate) fn slipped(self, prior: &Prior) -> Self {
-        self.widened(&prior.deviations(), at::TURN..at::RADIUS)
+        self.widened(&prior.deviations(), 0..at::RADIUS)
     }
 
     /// Adds these standard deviations to some parameters and keeps the means.

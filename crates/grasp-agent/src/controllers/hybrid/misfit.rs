@@ -18,7 +18,7 @@ pub enum Misfit {
     DeadZone,
     /// The image is mirrored or turned by quarters of a turn.
     TurnedImage,
-    /// The camera has moved in its mount since the model was learned.
+    /// The camera has moved in its mount, or its lens was turned, since the model was learned.
     CameraSlipped,
     /// Grips miss where the sightings put the ball: the arm differs from its model.
     Arm,
@@ -34,7 +34,7 @@ impl std::fmt::Display for Misfit {
             Self::LateImages => "the images are late; take newer ones, or set lag_check",
             Self::DeadZone => "the arm does not make the small moves that it reports",
             Self::TurnedImage => "the image is mirrored or turned",
-            Self::CameraSlipped => "the camera has moved in its mount",
+            Self::CameraSlipped => "the camera has moved in its mount, or its lens was turned",
             Self::Arm => "grips miss the ball that is seen; teach the goal, or check the arm",
             Self::Outliers => "some sightings are not of the ball",
             Self::Unexplained => "the ball may be moving, or the model of the cell is wrong",

@@ -12,7 +12,7 @@ use crate::controllers::hybrid::settings::HybridSettings;
 const SLIP_SHOWS: (usize, f64, f64) = (3, 80.0, 3.0);
 /// Number of runs in order without a misfit, after which another one can show a slip.
 const CALM: usize = 3;
-/// Number of own aims that may miss in one run before the arm is in doubt.
+/// Number of own aims that may miss in one run before arm and older runs are in doubt.
 const OFTEN: usize = 3;
 /// Least number of sightings that are judged after losses.
 const FEW: usize = 4;
@@ -134,6 +134,11 @@ impl Hybrid {
             self.before = self.belief.clone().slipped(&self.settings.prior);
             self.remembered = vec![recent, record];
             self.shown = false;
+        } else if self.learning && self.shown && self.run.misses > OFTEN {
+            // The cell may have changed little by little.
+            let older = (self.remembered.len() - 1) / 2;
+            self.remembered.drain(1..=older);
+            self.before = self.belief.fresh(&self.settings.prior);
         }
         if !self.learning || !std::mem::take(&mut self.news) {
             return;
