@@ -254,7 +254,7 @@ impl BehaviourSpec {
 
     /// Returns the behaviour with another reward.
     #[must_use]
-    pub fn with_reward(self, reward: Reward) -> Self {
+    pub(crate) fn with_reward(self, reward: Reward) -> Self {
         Self { reward, ..self }
     }
 

@@ -86,7 +86,10 @@ impl Camera {
     /// # Errors
     /// [`QuantityError::Value`] if it is not finite; [`QuantityError::Folds`] if a distorted image
     /// would fold.
-    pub fn with_principal_point(self, principal: Point2<f64>) -> Result<Self, QuantityError> {
+    pub(crate) fn with_principal_point(
+        self,
+        principal: Point2<f64>,
+    ) -> Result<Self, QuantityError> {
         finite("principal point x (px)", principal.x)?;
         finite("principal point y (px)", principal.y)?;
         Self { principal, ..self }.unfolded()

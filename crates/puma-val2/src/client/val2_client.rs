@@ -65,11 +65,6 @@ impl<T: Transport> Val2Client<T> {
         &mut self.wire.line
     }
 
-    /// Gives the line back.
-    pub fn into_line(self) -> T {
-        self.wire.line
-    }
-
     /// Returns the joint angles that the arm reported last, without asking it. `None`: it may have
     /// moved since, or the controller was started again.
     pub fn last_known(&self) -> Option<Joints> {

@@ -64,7 +64,7 @@ impl DriveTrain {
     }
 
     /// Returns the joint angles at the nearest whole encoder counts, where an arm can stand.
-    pub fn quantized(&self, joints: &Joints) -> Joints {
+    pub(crate) fn quantized(&self, joints: &Joints) -> Joints {
         self.joints(self.counts(joints).map(f64::round))
     }
 }

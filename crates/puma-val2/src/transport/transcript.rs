@@ -81,21 +81,6 @@ impl<T: Transport, W: Write> Recorded<T, W> {
             transcript: Transcript::new(out),
         }
     }
-
-    /// Returns the line.
-    pub fn line(&self) -> &T {
-        &self.line
-    }
-
-    /// Returns the line, to press the buttons of an emulator.
-    pub fn line_mut(&mut self) -> &mut T {
-        &mut self.line
-    }
-
-    /// Returns the receiver of the transcript.
-    pub fn into_transcript(self) -> W {
-        self.transcript.out
-    }
 }
 
 impl<T: Transport, W: Write> Transport for Recorded<T, W> {

@@ -449,10 +449,12 @@ fn a_message_at_connection_is_no_echo() {
 
 #[test]
 fn what_passes_is_written_down() {
-    let line = puma_val2::Recorded::new(MemoryLine::new(emulator(Profile::val2())), Vec::new());
+    let mut written = Vec::new();
+    let line = MemoryLine::new(emulator(Profile::val2()));
+    let line = puma_val2::Recorded::new(line, &mut written);
     let mut client = Val2Client::connect(line, ClientConfig::default()).unwrap();
     client.set_speed(30.0).unwrap();
-    let written = String::from_utf8(client.into_line().into_transcript()).unwrap();
+    let written = String::from_utf8(written).unwrap();
     assert!(
         written.ends_with("< SPEED 30 \n> SPEED 30 \n< ^M\n> \n> ."),
         "{written}"
