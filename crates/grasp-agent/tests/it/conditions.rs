@@ -23,6 +23,10 @@ const OUTLIERS: &[Misfit] = &[Misfit::Outliers];
 const NO_CAUSE: &[Misfit] = &[];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
+fn stands(odd: &mut Odd, joint: usize) {
+    (odd.stands[joint], odd.dishonest) = (true, true);
+}
+
 const SET: &[Condition] = &[
     ("one look late", |o| o.late = 1, LATE),
     ("mirrored", |o| o.mirrored = true, TURNED),
@@ -93,6 +97,8 @@ const FEW: [&str; 3] = ["mirrored", "upside down", "three looks late"];
 
 /// Other values, on which nothing was set.
 const FRESH: &[Condition] = &[
+    ("JT2 stands", |o| stands(o, 1), ZONE),
+    ("JT3 stands", |o| stands(o, 2), ZONE),
     ("three looks late", |o| o.late = 3, LATE),
     ("turned by roll 180", |o| o.roll = 180.0 * DEGREE, TURNED),
     (

@@ -231,6 +231,18 @@ fn a_lens_that_drifts_is_followed() {
 }
 
 #[test]
+fn features_rounded_to_more_than_the_goal_are_enough() {
+    for (quantum, cell) in [(1.0, 1000), (2.0, 1001), (4.0, 1002), (4.0, 1003)] {
+        let odd = Odd {
+            quantum,
+            ..Odd::default()
+        };
+        let (held, _) = held(HEAVY, odd, cell, 4);
+        assert_eq!(held, 4, "{quantum} units, cell {cell}");
+    }
+}
+
+#[test]
 fn friction_is_overcome_by_turning_back_first() {
     let balls = 5;
     for degrees in [0.5_f64, 1.5] {

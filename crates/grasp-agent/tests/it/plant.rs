@@ -35,6 +35,8 @@ pub(crate) struct Odd {
     pub(crate) stiction: f64,
     /// `true` if the encoders report a move that was not made.
     pub(crate) dishonest: bool,
+    /// `true` for a joint of the first three that makes no turn at all.
+    pub(crate) stands: [bool; 3],
     /// Looks by which the image is late.
     pub(crate) late: usize,
     /// `true` if the image is mirrored left to right.
@@ -410,7 +412,8 @@ impl Manipulator for Plant {
         let mut state = self.0.borrow_mut();
         let mut motors = state.motors;
         for i in 0..6 {
-            let stuck = i < 3 && (target.0[i] - motors.0[i]).abs() < state.odd.stiction;
+            let small = i < 3 && (target.0[i] - motors.0[i]).abs() < state.odd.stiction;
+            let stuck = small || state.odd.stands.get(i) == Some(&true);
             if !stuck {
                 motors.0[i] = target.0[i];
             }

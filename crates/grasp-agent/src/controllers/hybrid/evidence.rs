@@ -166,12 +166,12 @@ impl Evidence {
         evidence
     }
 
-    /// Returns the evidence with a path on which joints do not make turns of less than `zone`
-    /// radians.
-    pub(crate) fn sticking(&self, zone: f64) -> Self {
+    /// Returns the evidence with a path on which the first three joints do not make turns of less
+    /// than so many radians.
+    pub(crate) fn sticking(&self, zones: [f64; 3]) -> Self {
         let mut evidence = self.clone();
         for i in 1..evidence.path.len() {
-            for joint in 0..3 {
+            for (joint, zone) in zones.into_iter().enumerate() {
                 let stands = evidence.path[i - 1].0[joint];
                 let wanted = &mut evidence.path[i].0[joint];
                 if (*wanted - stands).abs() < zone {

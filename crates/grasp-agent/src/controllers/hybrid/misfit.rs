@@ -14,7 +14,7 @@ use crate::sight::camera_model::CameraModel;
 pub enum Misfit {
     /// Images show an earlier pose; see [`AgentConfig::lag_check`](crate::AgentConfig::lag_check).
     LateImages,
-    /// The arm does not make small moves, although it reports them.
+    /// The arm does not make small moves, or a joint none at all, although it reports them.
     DeadZone,
     /// The image is mirrored or turned by quarters of a turn.
     TurnedImage,
@@ -32,7 +32,7 @@ impl std::fmt::Display for Misfit {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::LateImages => "the images are late; take newer ones, or set lag_check",
-            Self::DeadZone => "the arm does not make the small moves that it reports",
+            Self::DeadZone => "the arm does not make all moves that it reports",
             Self::TurnedImage => "the image is mirrored or turned",
             Self::CameraSlipped => "the camera has moved in its mount, or its lens was turned",
             Self::Arm => "grips miss the ball that is seen; teach the goal, or check the arm",
@@ -89,10 +89,12 @@ pub(crate) fn misfit(
         (number >= TELLS.0).then(|| fit.cost / number as f64)
     };
     let plain = cost(&pair(&Evidence::clone))?;
+    // A noisy camera that fits otherwise.
+    let usual = FITS.max(3.0 * belief.noise().powi(2));
     if plain < FITS {
         let learned = Fit::of(belief, &belief.numbers(), nominal, &[&record.thinned()])?;
         let by_learned = learned.cost * belief.noise().powi(2) / record.thinned().len() as f64;
-        return (calm && by_learned > 2.0 * FITS).then_some(Misfit::CameraSlipped);
+        return (calm && by_learned > 2.0 * usual).then_some(Misfit::CameraSlipped);
     }
     let (w, h) = (Features::WIDTH, Features::HEIGHT);
     // Rows of the matrices by which x and y are turned.
@@ -117,8 +119,18 @@ pub(crate) fn misfit(
         (Misfit::LateImages, late)
     });
     let (least, ratio, number) = DEAD_ZONES;
-    let zones = (0..number).map(|i| least * ratio.powi(i));
-    let dead = zones.map(|zone| (Misfit::DeadZone, pair(&|record| record.sticking(zone))));
+    let small = (0..number).map(|i| [least * ratio.powi(i); 3]);
+    let never = f64::INFINITY;
+    let joints = [0, 1, 2].map(|joint| {
+        let mut zones = [0.0; 3];
+        zones[joint] = never;
+        zones
+    });
+    let sticking = |zones| (Misfit::DeadZone, pair(&|record| record.sticking(zones)));
+    // Joints that stand explain whatever repeats, as a false circle does; so they must fit.
+    let standing = joints.into_iter().chain([[never; 3]]).map(sticking);
+    let standing = standing.filter(|(_, record)| cost(record).is_some_and(|cost| cost < FITS));
+    let dead = small.map(sticking).chain(standing);
     let dragged = DRAGS.map(|share| {
         (
             Misfit::Arm,
@@ -168,7 +180,8 @@ pub(crate) fn misfit(
         own < EXPLAINED * plain && (plain - own) * number > TELLS.1
     };
     let explained = best.filter(|(cause, cost)| tells(*cause, *cost));
-    Some(explained.map_or(Misfit::Unexplained, |(cause, _)| cause))
+    let unexplained = (plain > usual).then_some(Misfit::Unexplained);
+    explained.map(|(cause, _)| cause).or(unexplained)
 }
 
 /// Returns the mean cost of a sighting if the sightings that lie far from their expected place are

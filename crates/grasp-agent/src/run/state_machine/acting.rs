@@ -30,8 +30,9 @@ impl Run<'_> {
             if self.camera.looked(&self.joints, frame, ball.as_ref()) {
                 self.tell(EventKind::SameFrame);
             }
-            // No grip is verified by an image that has not changed.
-            let most = if self.closed {
+            // No grip is verified by a frame that has not changed. A ball that is held may show the
+            // same features from everywhere.
+            let most = if self.closed && self.devices.eye.frame().is_some() {
                 1
             } else {
                 self.config.same_frames

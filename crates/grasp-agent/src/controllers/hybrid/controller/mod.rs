@@ -11,7 +11,7 @@ use crate::controllers::hybrid::evidence::{Evidence, Links};
 use crate::controllers::hybrid::fit::Fit;
 use crate::controllers::hybrid::misfit::Misfit;
 use crate::controllers::hybrid::parameters::{
-    Numbers, WithBall, corrected, deviations, sensitivity, vector,
+    Numbers, WithBall, at, corrected, deviations, sensitivity, vector,
 };
 use crate::controllers::hybrid::settings::HybridSettings;
 use crate::controllers::taught_goal::TaughtGoal;
@@ -81,6 +81,8 @@ struct Run {
     misses: usize,
     /// `true` if the first one was certain.
     sure: bool,
+    /// Decisions in a row to stay, away from the goal.
+    stays: usize,
 }
 
 impl Default for Run {
@@ -100,6 +102,7 @@ impl Default for Run {
             missed: false,
             misses: 0,
             sure: false,
+            stays: 0,
         }
     }
 }
@@ -132,6 +135,9 @@ const FAR_ENOUGH: f64 = 5.5;
 /// more.
 const LARGEST: f64 = 55.0;
 const NEARER: f64 = 1.25;
+/// Turn of a joint below which the arm stays, radians, and number of such decisions in a row before
+/// a grip from there.
+const STAYS: (f64, usize) = (0.002, 3);
 /// Fractions of the way that are tried, in order.
 const SHARES: [f64; 9] = [1.0, 0.85, 0.7, 0.55, 0.4, 0.3, 0.2, 0.1, 0.05];
 /// Smallest fraction of the way, after any number of losses.
@@ -369,6 +375,25 @@ impl Hybrid {
         }
         self.plan(self.run.estimate.as_ref()?, request)
     }
+
+    /// Decides on the grip if no move is left to bring the ball nearer to the goal: the features
+    /// may be too coarse for it, or a joint at its limit.
+    fn move_or_grip(&mut self, delta: JointDelta) -> Decision {
+        let numbers = self.run.estimate.as_ref().map(|estimate| estimate.numbers);
+        let turned = |joint: usize, turn: &f64| {
+            // A turn back takes up the backlash first.
+            let play = numbers.map_or(0.0, |n| n[at::PLAY + joint].max(0.0));
+            turn.abs() > STAYS.0 + play
+        };
+        let mut turns = (0..3).zip(&delta.0);
+        let stays = !self.run.doubt && !turns.any(|(joint, turn)| turned(joint, turn));
+        self.run.stays = if stays { self.run.stays + 1 } else { 0 };
+        if self.run.stays < STAYS.1 {
+            return Decision::Move(delta);
+        }
+        self.run.stays = 0;
+        Decision::Grip(JointDelta::default())
+    }
 }
 
 impl Controller for Hybrid {
@@ -383,7 +408,8 @@ impl Controller for Hybrid {
         } else if request.grip {
             self.aim(ball, request).map(Decision::Grip)
         } else {
-            self.reach(ball, request).map(Decision::Move)
+            let delta = self.reach(ball, request);
+            delta.map(|delta| self.move_or_grip(delta))
         };
         decision.ok_or(GaveUp::NoMoveLeft)
     }
