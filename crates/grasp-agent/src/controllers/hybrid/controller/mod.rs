@@ -11,7 +11,7 @@ use crate::controllers::hybrid::evidence::{Evidence, Links};
 use crate::controllers::hybrid::fit::Fit;
 use crate::controllers::hybrid::misfit::Misfit;
 use crate::controllers::hybrid::parameters::{
-    Numbers, WithBall, at, corrected, deviations, sensitivity, vector,
+    Numbers, WithBall, corrected, deviations, sensitivity, vector,
 };
 use crate::controllers::hybrid::settings::HybridSettings;
 use crate::controllers::taught_goal::TaughtGoal;
@@ -137,7 +137,7 @@ const LARGEST: f64 = 55.0;
 const NEARER: f64 = 1.25;
 /// Turn of a joint below which the arm stays, radians, and number of such decisions in a row before
 /// a grip from there.
-const STAYS: (f64, usize) = (0.002, 3);
+const STAYS: (f64, usize) = (0.002, 8);
 /// Fractions of the way that are tried, in order.
 const SHARES: [f64; 9] = [1.0, 0.85, 0.7, 0.55, 0.4, 0.3, 0.2, 0.1, 0.05];
 /// Smallest fraction of the way, after any number of losses.
@@ -378,15 +378,23 @@ impl Hybrid {
 
     /// Decides on the grip if no move is left to bring the ball nearer to the goal: the features
     /// may be too coarse for it, or a joint at its limit.
-    fn move_or_grip(&mut self, delta: JointDelta) -> Decision {
-        let numbers = self.run.estimate.as_ref().map(|estimate| estimate.numbers);
-        let turned = |joint: usize, turn: &f64| {
-            // A turn back takes up the backlash first.
-            let play = numbers.map_or(0.0, |n| n[at::PLAY + joint].max(0.0));
-            turn.abs() > STAYS.0 + play
-        };
-        let mut turns = (0..3).zip(&delta.0);
-        let stays = !self.run.doubt && !turns.any(|(joint, turn)| turned(joint, turn));
+    fn move_or_grip(&mut self, delta: JointDelta, joints: &Joints) -> Decision {
+        // A turn back takes up the backlash first.
+        let turned = self
+            .run
+            .estimate
+            .as_ref()
+            .map_or(f64::INFINITY, |estimate| {
+                let (numbers, arm) = (&estimate.numbers, &self.settings.nominal.arm);
+                let mut links = self.run.evidence.links(numbers, arm);
+                let from = links.stand();
+                links.follow(&(*joints + delta));
+                let turns = (links.stand() - from).0;
+                turns
+                    .into_iter()
+                    .fold(0.0, |most, turn| turn.abs().max(most))
+            });
+        let stays = !self.run.doubt && turned < STAYS.0;
         self.run.stays = if stays { self.run.stays + 1 } else { 0 };
         if self.run.stays < STAYS.1 {
             return Decision::Move(delta);
@@ -409,7 +417,7 @@ impl Controller for Hybrid {
             self.aim(ball, request).map(Decision::Grip)
         } else {
             let delta = self.reach(ball, request);
-            delta.map(|delta| self.move_or_grip(delta))
+            delta.map(|delta| self.move_or_grip(delta, &request.joints))
         };
         decision.ok_or(GaveUp::NoMoveLeft)
     }
