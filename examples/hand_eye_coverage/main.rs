@@ -8,18 +8,17 @@
 use std::fs;
 use std::path::PathBuf;
 
-use clap::{Parser, ValueEnum};
+use clap::Parser;
 use grasp_agent::nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use grasp_agent::{Calibration, CameraModel, HandEye};
 use hough_heuristic::{Circle, Features};
-use pipeline_sim::{
-    Ball, Cell, ErrorLevel, Errors, FeatureCamera, SharedCell, SimulatedArm, Workspace,
-};
+use pipeline_sim::{Cell, ErrorLevel, Errors, FeatureCamera, SharedCell, SimulatedArm, Workspace};
 use puma_val2::{Joint, JointDelta, Joints, Kinematics};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
 
+use example_support::learning::{ArmName, believed};
 use example_support::prelude::*;
 use example_support::program::on_threads;
 use example_support::trial::FeatureEye;
@@ -65,38 +64,6 @@ struct Options {
     /// Write each cell, with poses before a board, as a line of JSON.
     #[arg(long)]
     cells_file: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum ArmName {
-    Puma,
-    Ur5,
-    So101,
-}
-
-impl ArmName {
-    /// Returns the cell as it is meant to be, and where its balls lie.
-    fn cell(self) -> (Cell, Workspace) {
-        let ball = Ball::at(0.5, 0.0, 0.0);
-        match self {
-            Self::Puma => (Cell::paper(ball), Workspace::paper()),
-            Self::Ur5 => (Cell::ur5(ball), Workspace::ur5()),
-            Self::So101 => (Cell::so101(ball), Workspace::so101()),
-        }
-    }
-}
-
-/// Returns what an arm without errors believes of its cell.
-fn believed(cell: &Cell) -> CameraModel {
-    let paper = CameraModel::paper();
-    let units = Features::WIDTH / f64::from(cell.camera.size().0);
-    CameraModel {
-        arm: cell.arm,
-        focal: cell.camera.focal_px() * units,
-        mount: cell.mount,
-        tool: cell.hand.tool,
-        ..paper
-    }
 }
 
 /// Draws a ball that a search pose shows well, and places it there.

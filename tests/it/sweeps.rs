@@ -96,3 +96,26 @@ fn shards_of_other_settings_are_refused_by_name() {
         assert!(errors.contains("I/N"), "{wrong}: {errors}");
     }
 }
+
+#[test]
+fn cells_of_another_arm_are_compared() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(mut compare) = example("compare_controllers") else {
+        return;
+    };
+    compare.args([
+        "--arm", "so101", "--draws", "1", "--starts", "2", "--moves", "60",
+    ]);
+    compare.args(["--levels", "none", "--only", "i", "--out"]);
+    let (output, errors) = output(compare.arg(folder.path()));
+    assert_eq!(errors, "");
+    let rows = String::from_utf8_lossy(&output.stdout);
+    // The learned tables and the fuzzy rules are a PUMA's.
+    assert!(
+        rows.contains("hybrid ") && rows.contains("position-based"),
+        "{rows}"
+    );
+    assert!(!rows.contains("Q 90") && !rows.contains("fuzzy"), "{rows}");
+    let errors = sweep(folder.path(), &["--arm", "ur5", "--full-chain"]).expect("built");
+    assert!(errors.contains("drives a PUMA"), "{errors}");
+}

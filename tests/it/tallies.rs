@@ -55,8 +55,11 @@ fn the_interval_of_a_comparison_always_leaves_some_chance() {
     // More runs in as many cells do not narrow the interval; a cell without runs does not count.
     assert!(row(&[(300, 300); 16]).to_string().contains("80.6..100.0"));
     assert!(row(&[(3, 6), (0, 0), (6, 6)]).to_string().contains(" 75.0"));
-    assert_eq!(row(&[]).csv(), "heavy,\"hybrid\",,,,0,0,,NaN,,0");
-    let file = all.csv();
+    let none = row(&[]);
+    let file = "heavy,\"hybrid\",,,,0,0,,NaN,,0,0,,,";
+    assert_eq!(none.csv(&none), file);
+    let file = all.csv(&row(&[(30, 30); 8]));
+    assert!(file.ends_with(",480,8,100.000,67.558,100.000"), "{file}");
     assert!(file.contains("100.000,80.639,100.000,16,16"), "{file}");
     let plot = plot(&[all], "grasped").expect("draws");
     assert!(plot.contains("9.0 moves, 100.0 %"), "{plot}");

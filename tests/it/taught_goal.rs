@@ -1,11 +1,12 @@
 //! A goal that is shown on the arm, in cells whose camera is not what it is taken to be.
 
+use example_support::learning::ArmName;
 use example_support::trial::TrialCell;
 use grasp_agent::{
     Agent, AgentConfig, Controller, Hybrid, HybridSettings, Servo, ServoLaw, ServoSettings,
     TaughtGoal,
 };
-use pipeline_sim::ErrorLevel;
+use pipeline_sim::{ErrorLevel, Errors};
 use puma_val2::Joint;
 
 /// Balls in each cell.
@@ -97,4 +98,25 @@ fn what_was_shown_tells_the_hybrid_of_the_camera() {
         10 * with >= 9 * balls && 2 * without <= with,
         "{with} and {without} of {balls}"
     );
+}
+
+#[test]
+fn a_goal_that_lies_within_the_hand_is_known_by_the_geometry() {
+    // A camera far back shows the ball at the goal where the hand is.
+    let shifted = |back: f64| {
+        let errors = Errors {
+            camera_shift: [0.0, 0.0, -back],
+            ..Errors::none()
+        };
+        TrialCell::with_errors(errors, ArmName::Puma).expect("a camera")
+    };
+    let forbids = |cell: &TrialCell| cell.forbids(&cell.agent_config().goal);
+    let cells = [-0.05, 0.0, 0.05, 0.095].map(shifted);
+    assert_eq!(cells.each_ref().map(forbids), [false, false, false, true]);
+    let [.., far] = cells;
+    // A hand that touches nothing forbids nothing, nor is the goal forbidden that is shown there.
+    assert!(!forbids(&far.clone().without_bodies()));
+    let goal = far.teach_goal(1).expect("no fault").expect("in view");
+    let config = far.agent_config().with_taught_goal(&goal);
+    assert!(!far.forbids(&config.goal), "{:?}", goal.features());
 }

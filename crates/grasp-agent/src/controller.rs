@@ -166,6 +166,11 @@ pub enum GaveUp {
     /// Something was too near to the hand: on three ways to the ball, when the closed hand was
     /// lifted, or on the way to every viewpoint of a search.
     Obstructed,
+    /// Three moves or more toward the goal ended too near to something before the ball showed
+    /// there, and from no pose could the jaws reach it: the hand itself may stand where the ball
+    /// shows at the goal. Show the goal on the arm
+    /// ([`Hybrid::shown`](crate::Hybrid::shown)), or mount the camera elsewhere.
+    GoalBarred,
     /// The goal was not reached, or the ball not found or gripped, and the controller's model does
     /// not fit what was seen.
     Misfit(Misfit),
@@ -184,6 +189,10 @@ impl std::fmt::Display for GaveUp {
             Self::Obstructed => {
                 "something was too near to the hand on the way to every search pose, to the ball, \
                  or when the hand was lifted"
+            }
+            Self::GoalBarred => {
+                "the hand came too near to something, perhaps the ball itself, before the ball \
+                 showed at the goal: show the goal on the arm"
             }
             Self::Misfit(cause) => return write!(f, "the model does not fit: {cause}"),
         })

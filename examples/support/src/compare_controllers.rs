@@ -8,7 +8,9 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Parser;
-use grasp_agent::{Agent, AgentConfig, Controller, Hybrid, RunEvent, SavedRun, TaughtGoal};
+use grasp_agent::{
+    Agent, AgentConfig, Controller, GoalInterval, Hybrid, RunEvent, SavedRun, TaughtGoal,
+};
 use hough_heuristic::CircleDetector;
 use pipeline_sim::{ErrorLevel, Errors, Scene, Workspace};
 use puma_grasp::{BallDetector, Rig};
@@ -17,11 +19,12 @@ use rand::rngs::Xoshiro256PlusPlus;
 
 use crate::comparison::Row;
 use crate::files::writable_folder;
+use crate::learning::ArmName;
 use crate::prelude::*;
 use crate::program::on_threads;
 use crate::stages::Stages;
 use crate::tally::Counted;
-use crate::trial::{Trial, TrialCell, ball_in_view, rig_with_errors, run_on_rig};
+use crate::trial::{Trial, TrialCell, ball_in_view, rig_with_errors, run_on_rig, sensors_forbid};
 
 use crate::compare_controllers::rivals::{Rival, new_hybrid, rivals};
 use crate::compare_controllers::sweep::{CellRuns, Settings, Shard, Sweep, Tables};
@@ -33,8 +36,9 @@ use crate::compare_controllers::sweep::{CellRuns, Settings, Shard, Sweep, Tables
 /// circle detection, and the arm is driven through VAL II; fewer --draws and --starts are enough
 /// then.
 ///
-/// A run succeeds if the ball's features reach the goal within 60 moves; with --grip, if the jaws
-/// hold the ball at the end. All controllers have the same search, recovery and limits, and none
+/// A run succeeds if the ball's features reach the goal within 60 moves, or the jaws hold the ball
+/// at the end; with --grip, only if they hold it. In some cells with errors the hand itself stands
+/// where the ball would show at the goal; these are named after each level, by their geometry. All controllers have the same search, recovery and limits, and none
 /// turns a joint farther in one move than the paper's behaviours do. The hybrid first learns each
 /// cell by up to --moves moves toward other balls; `hybrid, untaught` does not.
 ///
@@ -65,6 +69,10 @@ pub struct Options {
     /// noise, missed, outliers; NAME=AMOUNT for another than the usual amount
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     odd: Vec<String>,
+    /// Arm of the cells: puma, ur5 or so101. The learned tables and the fuzzy rules are a PUMA's,
+    /// and are left out for another arm
+    #[arg(long, value_enum, value_name = "ARM", default_value_t = ArmName::Puma)]
+    arm: ArmName,
     /// Compare only controllers whose name contains this
     #[arg(long, value_name = "TEXT", default_value = "")]
     only: String,
@@ -111,6 +119,9 @@ pub fn run(options: &Options) -> Outcome {
     let _lock = lock_folder(&options.out)?;
     if !options.merge.is_empty() {
         return merge(options);
+    }
+    if options.full_chain && options.arm != ArmName::Puma {
+        return Err("--full-chain drives a PUMA: leave --arm away".into());
     }
     let rivals = rivals(options)?;
     let sweep = Sweep::begin(&options.out, settings(options, &rivals), options.resume)?;
@@ -199,6 +210,7 @@ fn settings(options: &Options, rivals: &[(&'static str, Rival)]) -> Settings {
         moves: options.moves,
         levels: options.levels.iter().map(ToString::to_string).collect(),
         odd: options.odd.clone(),
+        arm: format!("{:?}", options.arm).to_lowercase(),
         grip: options.grip,
         taught_goal: options.taught_goal,
         full_chain: options.full_chain,
@@ -217,12 +229,13 @@ fn cell_runs(
     let begun = Instant::now();
     let cell = DrawnCell::new(options, level, draw as u64)?;
     let mut world = cell.world()?;
+    let forbidden = world.forbids(&cell.config.goal);
     let runs = rivals
         .iter()
         .map(|(name, rival)| cell.runs(name, rival, &mut world));
     let runs = runs.collect::<Outcome<Vec<_>>>()?;
     let unshown = options.taught_goal && cell.goal.is_none();
-    Ok(CellRuns::new(&runs, unshown, begun))
+    Ok(CellRuns::new(&runs, [unshown, forbidden], begun))
 }
 
 /// A cell with drawn errors, in which all controllers are tried.
@@ -233,21 +246,21 @@ struct DrawnCell<'a> {
     /// The goal shown in the cell. A cell in which it cannot be shown keeps the paper's.
     goal: Option<TaughtGoal>,
     config: AgentConfig,
+    nominal: TrialCell,
 }
 
 impl<'a> DrawnCell<'a> {
     fn new(options: &'a Options, level: ErrorLevel, draw: u64) -> Outcome<Self> {
-        let paper = AgentConfig::paper(Workspace::paper().search_poses());
         let mut cell = Self {
             options,
             level,
             draw,
             goal: None,
-            config: AgentConfig {
-                lift: paper.lift.filter(|_| options.grip),
-                ..paper
-            },
+            config: AgentConfig::paper(Workspace::paper().search_poses()),
+            nominal: TrialCell::with_errors(Errors::none(), options.arm)?,
         };
+        cell.config = cell.nominal.agent_config();
+        cell.config.lift = cell.config.lift.filter(|_| options.grip);
         if options.taught_goal
             && let World::Shortcut(world) = cell.world()?
         {
@@ -277,7 +290,7 @@ impl<'a> DrawnCell<'a> {
         }
         let controller = match rival {
             Rival::Hybrid => Box::new(self.taught_hybrid(name, world)?),
-            _ => rival.controller(self.goal.as_ref()),
+            _ => rival.controller(&self.nominal, self.goal.as_ref()),
         };
         let mut agent = Agent::with_controller(self.config.clone(), controller)?;
         let mut runs = Vec::new();
@@ -295,7 +308,7 @@ impl<'a> DrawnCell<'a> {
                     success: if options.grip {
                         trial.held
                     } else {
-                        trial.at_goal.is_some()
+                        trial.at_goal.is_some() || trial.held
                     },
                     // Moves after reaching the goal are not counted.
                     moves: match trial.at_goal {
@@ -326,8 +339,8 @@ impl<'a> DrawnCell<'a> {
     /// Returns the hybrid after at most `--moves` moves in `world`, frozen. If a fault ends its
     /// teaching, it works with what it has learned by then.
     fn taught_hybrid(&self, name: &str, world: &mut World) -> Outcome<Hybrid> {
-        let mut agent =
-            Agent::with_controller(self.config.clone(), new_hybrid(self.goal.as_ref()))?;
+        let hybrid = new_hybrid(&self.nominal, self.goal.as_ref());
+        let mut agent = Agent::with_controller(self.config.clone(), hybrid)?;
         let (longest, moves) = (self.config.max_cycles, self.options.moves);
         let seed = seed_of(self.options.seed, &[2, self.draw]);
         let (mut made, mut run) = (0, 0);
@@ -395,7 +408,7 @@ impl World {
             let detector = options.detector.build(seed)?;
             return Ok(Self::Chain(Box::new(rig), detector, Box::new(errors)));
         }
-        let cell = TrialCell::with_errors(errors)?;
+        let cell = TrialCell::with_errors(errors, options.arm)?;
         let cell = if options.grip {
             cell
         } else {
@@ -409,6 +422,14 @@ impl World {
         match self {
             Self::Shortcut(cell) => cell.slip(),
             Self::Chain(rig, _, errors) => rig.cell().with(|cell| errors.slip_camera(cell)),
+        }
+    }
+
+    /// Returns `true` if the hand itself keeps the ball from the goal.
+    fn forbids(&self, goal: &[GoalInterval]) -> bool {
+        match self {
+            Self::Shortcut(cell) => cell.forbids(goal),
+            Self::Chain(rig, ..) => sensors_forbid(&rig.cell().get(), goal),
         }
     }
 

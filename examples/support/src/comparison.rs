@@ -35,7 +35,7 @@ impl Row {
     /// Names of the columns of the file.
     pub const CSV_HEADER: &str = "level,controller,success_percent,low,high,\
                                   cells_without_failure,cells,cycles,losses_per_run,collisions,\
-                                  runs";
+                                  runs,free_cells,free_success_percent,free_low,free_high";
 
     /// Makes the row of controller `name` at a level of errors.
     pub fn new(level: ErrorLevel, name: &str, tally: &Tally) -> Self {
@@ -62,23 +62,20 @@ impl Row {
         }
     }
 
-    /// Returns the row of the file.
-    pub fn csv(&self) -> String {
-        let [success, low, high, cycles] = [
-            self.success,
-            self.interval[0],
-            self.interval[1],
-            self.cycles,
-        ]
-        .map(|value| number(value, 3));
+    /// Returns the row of the file; `free` is that of the cells whose goal the hand does not forbid.
+    pub fn csv(&self, free: &Self) -> String {
+        let of = |row: &Self| [row.success, row.interval[0], row.interval[1]];
+        let [success, low, high] = of(self).map(|value| number(value, 3));
+        let cycles = number(self.cycles, 3);
+        let in_free = of(free).map(|value| number(value, 3)).join(",");
         let collisions = self
             .collisions
             .map_or(String::new(), |count| count.to_string());
         let (level, name, whole, cells) = (self.level, &self.name, self.whole_cells, self.cells);
-        let (losses, runs) = (self.losses, self.runs);
+        let (losses, runs, free) = (self.losses, self.runs, free.cells);
         format!(
             "{level},\"{name}\",{success},{low},{high},{whole},{cells},{cycles},{losses:.4},\
-             {collisions},{runs}"
+             {collisions},{runs},{free},{in_free}"
         )
     }
 }

@@ -2,8 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use grasp_agent::{BehaviourPair, Learned, Percept};
-use pipeline_sim::{Ball, Cell, MoveForm};
+use clap::ValueEnum;
+use grasp_agent::{BehaviourPair, CameraModel, Learned, Percept};
+use hough_heuristic::Features;
+use pipeline_sim::{Ball, Cell, MoveForm, Workspace};
 use puma_grasp::Simulator;
 use qtable::Record;
 use rand::Rng;
@@ -25,6 +27,40 @@ pub const TRIALS: usize = 500;
 /// Returns the paper's cell, with the ball in front of the arm.
 pub fn paper_cell() -> Cell {
     Cell::paper(Ball::at(0.6, 0.0, -0.1))
+}
+
+/// An arm with a cell of its own.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub enum ArmName {
+    /// The paper's PUMA 560.
+    Puma,
+    /// A UR5 with the paper's camera and gripper.
+    Ur5,
+    /// A desk arm of the size of the SO-101.
+    So101,
+}
+
+impl ArmName {
+    /// Returns the cell as it is meant to be, and where its balls lie.
+    pub fn cell(self) -> (Cell, Workspace) {
+        match self {
+            Self::Puma => (paper_cell(), Workspace::paper()),
+            Self::Ur5 => (Cell::ur5(Ball::at(-0.5, 0.0, 0.0)), Workspace::ur5()),
+            Self::So101 => (Cell::so101(Ball::at(0.3, 0.0, 0.0)), Workspace::so101()),
+        }
+    }
+}
+
+/// Returns what an arm without errors believes of its cell.
+pub fn believed(cell: &Cell) -> CameraModel {
+    let units = Features::WIDTH / f64::from(cell.camera.size().0);
+    CameraModel {
+        arm: cell.arm,
+        focal: cell.camera.focal_px() * units,
+        mount: cell.mount,
+        tool: cell.hand.tool,
+        ..CameraModel::paper()
+    }
 }
 
 /// Samples moves in `cell` and fits a simulator of each form to them.

@@ -1,8 +1,8 @@
 //! One ball and an agent that goes for it; and the cell without rendering, the feature shortcut.
 
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, CameraEye, Controller, EventKind, Eye, GoalInterval, Input,
-    RunEvent, RunOutcome, ServoSettings, Sighting, TaughtGoal,
+    Agent, AgentConfig, AgentError, CameraEye, CameraModel, Controller, EventKind, Eye,
+    GoalInterval, Input, RunEvent, RunOutcome, Sighting, TaughtGoal,
 };
 use hough_heuristic::{CircleDetector, Features, FrameError};
 use pipeline_sim::{
@@ -10,11 +10,11 @@ use pipeline_sim::{
     SimulatedArm, Workspace,
 };
 use puma_grasp::{Rig, RigParts};
-use puma_val2::{ArmError, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
+use puma_val2::{Arm, ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use crate::learning::paper_cell;
+use crate::learning::{ArmName, believed};
 use crate::program::{Outcome, STOP};
 use crate::stages::Stages;
 
@@ -166,10 +166,36 @@ pub fn ball_in_view(cell: &SharedCell, rng: &mut Xoshiro256PlusPlus) -> Outcome<
     Ok(ball)
 }
 
+/// Returns `true` if the sensors on the hand of `cell` respond to the ball wherever it shows in the
+/// goal: the place that belongs to the goal in front of this camera lies within the hand.
+///
+/// That place moves with the hand, so one pose tells for all.
+pub fn sensors_forbid(cell: &Cell, goal: &[GoalInterval]) -> bool {
+    let joints = cell.reached;
+    let respond = |x: f64, y: f64, r: f64| {
+        let mut cell = Cell {
+            table: f64::NEG_INFINITY,
+            holder: None,
+            jaws: Gripper::Open,
+            held: None,
+            ..*cell
+        };
+        let place = cell.ball_showing(&joints, &Features { x, y, r });
+        place.is_none_or(|place| {
+            cell.ball.centre = place;
+            cell.proximity(&joints)
+        })
+    };
+    let [xs, ys, rs] = goal_of(goal).map(|(low, high)| [low, 0.5 * (low + high), high]);
+    let mut places = xs.iter().flat_map(|x| ys.map(|y| (*x, y)));
+    places.all(|(x, y)| rs.iter().all(|r| respond(x, y, *r)))
+}
+
 /// A cell with drawn errors on the feature shortcut: no frames, and an arm that moves at once.
 #[derive(Clone, Debug)]
 pub struct TrialCell {
     errors: Errors,
+    nominal: Cell,
     cell: Cell,
     workspace: Workspace,
     bodies: bool,
@@ -181,20 +207,42 @@ impl TrialCell {
     /// # Errors
     /// A camera that cannot be; none of the levels makes one.
     pub fn draw(level: ErrorLevel, seed: u64) -> Result<Self, QuantityError> {
-        Self::with_errors(level.draw(&mut Xoshiro256PlusPlus::seed_from_u64(seed)))
+        let errors = level.draw(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
+        Self::with_errors(errors, ArmName::Puma)
     }
 
-    /// Applies errors to the paper's cell.
+    /// Applies errors to the cell of an arm.
     ///
     /// # Errors
     /// The quantity that is out of range.
-    pub fn with_errors(errors: Errors) -> Result<Self, QuantityError> {
+    pub fn with_errors(errors: Errors, arm: ArmName) -> Result<Self, QuantityError> {
+        let (nominal, workspace) = arm.cell();
         Ok(Self {
-            cell: errors.apply(&paper_cell())?,
+            cell: errors.apply(&nominal)?,
+            nominal,
             errors,
-            workspace: Workspace::paper(),
+            workspace,
             bodies: true,
         })
+    }
+
+    /// Returns `true` if the hand itself keeps the ball from the goal ([`sensors_forbid`]).
+    pub fn forbids(&self, goal: &[GoalInterval]) -> bool {
+        self.bodies && sensors_forbid(&self.cell, goal)
+    }
+
+    /// Returns what an arm without errors believes of this cell.
+    pub fn believed(&self) -> CameraModel {
+        believed(&self.nominal)
+    }
+
+    /// Returns poses with balls of more and more radius, from the search to the goal, which is the
+    /// third.
+    pub fn poses_on_the_way(&self) -> [Joints; 4] {
+        let (goal, mut far) = (self.nominal.reached, self.workspace.search_poses()[0]);
+        far.0[0] = goal.0[0];
+        let middle = Joints(std::array::from_fn(|i| 0.5 * (far.0[i] + goal.0[i])));
+        [far, middle, goal, goal]
     }
 
     /// Gives the cell a hand that touches nothing, so that nothing can stand in the way of
@@ -230,9 +278,17 @@ impl TrialCell {
         shared
     }
 
+    /// Returns the pose of the arm before a trial: VAL's READY, or another arm's first search pose.
+    fn home(&self) -> Joints {
+        match self.nominal.arm {
+            Arm::Puma(_) => Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]),
+            Arm::Serial { .. } => self.workspace.search_poses()[0],
+        }
+    }
+
     /// Draws a ball that is in view from one of the search poses as the arm really takes them.
     fn sample_seen_ball(&self, rng: &mut Xoshiro256PlusPlus) -> Result<Option<Ball>, ArmError> {
-        let mut arm = SimulatedArm::new(self.shared(self.cell), home())?;
+        let mut arm = SimulatedArm::new(self.shared(self.cell), self.home())?;
         let mut pose = arm.pose();
         let mut stands = Vec::new();
         for search_pose in self.workspace.search_poses() {
@@ -255,11 +311,12 @@ impl TrialCell {
     /// Returns the paper's settings, without the lift for a hand without bodies, which cannot hold
     /// the ball.
     pub fn agent_config(&self) -> AgentConfig {
-        let paper = AgentConfig::paper(self.workspace.search_poses());
-        AgentConfig {
-            lift: paper.lift.filter(|_| self.bodies),
-            ..paper
-        }
+        let mut config = match self.nominal.arm {
+            Arm::Puma(_) => AgentConfig::paper(self.workspace.search_poses()),
+            ref arm => AgentConfig::for_arm(arm, self.workspace.search_poses()),
+        };
+        config.lift = config.lift.filter(|_| self.bodies);
+        config
     }
 
     /// Shows the goal on the arm: the ball is put between the open jaws, the grip's turn of `JT5`
@@ -276,7 +333,7 @@ impl TrialCell {
         const TURNS: [f64; 7] = [0.0, 4.0, -4.0, 8.0, -8.0, 12.0, -12.0];
         /// Turns of `JT4`, degrees, in the order of trial.
         const ASIDE: [f64; 8] = [4.0, -4.0, 8.0, -8.0, 12.0, -12.0, 16.0, -16.0];
-        let from = Joints::from_degrees(ServoSettings::GOAL_POSE);
+        let from = self.nominal.reached;
         let config = self.agent_config();
         let upright = TURNS.map(|more| (0.0, more));
         let turned = TURNS
@@ -302,12 +359,15 @@ impl TrialCell {
         seed: u64,
     ) -> Result<Option<Features>, ArmError> {
         const LOOKS: usize = 20;
+        if !self.nominal.within_limits(&(from + *grip)) {
+            return Ok(None);
+        }
         // The ball is shown between real jaws even where the hand has no bodies otherwise.
         let shared = self.shared(Cell {
-            hand: HandShape::paper(),
+            hand: self.nominal.hand,
             ..self.cell
         });
-        let mut arm = SimulatedArm::new(shared.clone(), home())?;
+        let mut arm = SimulatedArm::new(shared.clone(), self.home())?;
         arm.move_to(from + *grip)?;
         let gripping = arm.pose()();
         shared.with(|cell| cell.place_ball(cell.tool_point(&gripping)));
@@ -348,7 +408,7 @@ impl TrialCell {
         let mut cell = self.cell;
         cell.place_ball(ball.centre);
         let shared = self.shared(cell);
-        let mut arm = SimulatedArm::new(shared.clone(), home())?;
+        let mut arm = SimulatedArm::new(shared.clone(), self.home())?;
         let mut camera = FeatureCamera::new(shared.clone(), arm.pose(), rng.random());
         let mut pose = arm.pose();
         let mut eye = FeatureEye(|| {
@@ -376,9 +436,4 @@ fn well_inside(f: &Features) -> bool {
     f.r > 5.5
         && (MARGIN..Features::WIDTH - MARGIN).contains(&f.x)
         && (MARGIN..Features::HEIGHT - MARGIN).contains(&f.y)
-}
-
-/// Returns the pose of the arm before a trial: VAL's READY.
-fn home() -> Joints {
-    Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 }

@@ -48,6 +48,9 @@ pub(crate) enum Fault {
     HaltedTwice(usize),
     /// It halts the first three moves that show the ball with a radius above this.
     HaltedNear(f64),
+    /// The hand itself stands where the ball would show with this radius: every move that shows it
+    /// larger is halted, and every way of the gripper to it.
+    HandInTheWay(f64),
     /// It halts so many ways of the gripper to the ball.
     HaltedGrips(usize),
     /// It halts the closed hand in its first or second way.
@@ -316,6 +319,10 @@ impl Manipulator for Shared {
                         .truth
                         .view(&target, &cell.ball)
                         .is_some_and(|f| f.r > r)
+            }
+            Fault::HandInTheWay(r) => {
+                let seen = cell.truth.view(&target, &cell.ball);
+                seen.is_none_or(|f| f.r > r) && cell.looks > 0
             }
             Fault::HaltedGrips(times) => gripping && cell.halts < times,
             Fault::HaltedClosed(way) => {

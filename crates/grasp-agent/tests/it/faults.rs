@@ -252,6 +252,19 @@ fn an_arm_that_its_own_guard_halts_is_taken_back_and_goes_on() {
 }
 
 #[test]
+fn a_goal_within_the_hand_is_told() {
+    let mut hybrid = agent_of(hybrid());
+    let mut runs = vec![end_of(Fault::HandInTheWay(22.0)).0];
+    for _ in 0..3 {
+        let cell = Shared::paper(Fault::HandInTheWay(22.0));
+        runs.push(cell.run(&mut hybrid, &mut EventLog::default()));
+    }
+    for end in runs {
+        assert_eq!(end.unwrap().gave_up, Some(GaveUp::GoalBarred));
+    }
+}
+
+#[test]
 fn a_hybrid_grips_from_where_every_move_is_halted() {
     // The hybrid is halted again and again on its way, and knows by then where the ball is.
     let mut agent = agent_of(hybrid());

@@ -5,14 +5,17 @@ use grasp_agent::{
     ServoSettings, TaughtGoal,
 };
 use pipeline_sim::MoveForm;
+use puma_val2::Arm;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use crate::learning::{
-    ACTIONS, ACTIONS_FINE, TRIALS, anywhere, learned_whole, paper_cell, simulators, until_stopped,
+    ACTIONS, ACTIONS_FINE, ArmName, TRIALS, anywhere, learned_whole, paper_cell, simulators,
+    until_stopped,
 };
 use crate::plane::{ExactPlane, search_percepts};
 use crate::prelude::*;
+use crate::trial::TrialCell;
 
 use crate::compare_controllers::{Options, seed_of};
 
@@ -28,11 +31,20 @@ pub(crate) enum Rival {
 
 impl Rival {
     /// Makes the controller for the taught goal if there is one.
-    pub(crate) fn controller(&self, goal: Option<&TaughtGoal>) -> Box<dyn Controller> {
+    pub(crate) fn controller(
+        &self,
+        nominal: &TrialCell,
+        goal: Option<&TaughtGoal>,
+    ) -> Box<dyn Controller> {
         match (self, goal) {
             (Self::Servo(law, gain, adaptive), _) => {
                 let paper = ServoSettings::paper();
                 let settings = ServoSettings {
+                    model: nominal.believed(),
+                    poses: match nominal.believed().arm {
+                        Arm::Puma(_) => paper.poses,
+                        Arm::Serial { .. } => nominal.poses_on_the_way(),
+                    },
                     goal: goal.map_or(paper.goal, TaughtGoal::features),
                     gain: *gain,
                     adaptive: *adaptive,
@@ -42,7 +54,7 @@ impl Rival {
             }
             (Self::Learned(learned), None) => learned.clone(),
             (Self::Learned(learned), Some(goal)) => Box::new((**learned).clone().shown(goal)),
-            (Self::Untaught | Self::Hybrid, _) => Box::new(new_hybrid(goal).frozen()),
+            (Self::Untaught | Self::Hybrid, _) => Box::new(new_hybrid(nominal, goal).frozen()),
         }
     }
 }
@@ -79,16 +91,22 @@ pub(crate) fn rivals(options: &Options) -> Outcome<Vec<(&'static str, Rival)>> {
         ("hybrid", Rival::Hybrid),
     ];
     let mut rivals: Vec<_> = servos.into_iter().chain(learned).chain(hybrids).collect();
-    rivals.retain(|(name, _)| name.contains(&options.only));
+    rivals.retain(|(name, rival)| {
+        let degrees = matches!(rival, Rival::Servo(Law::FuzzyRules, ..));
+        name.contains(&options.only) && (options.arm == ArmName::Puma || !degrees)
+    });
     if rivals.is_empty() {
         return Err(format!("no controller has {:?} in its name", options.only).into());
     }
     Ok(rivals)
 }
 
-/// Returns the hybrid before its first move.
-pub(crate) fn new_hybrid(goal: Option<&TaughtGoal>) -> Hybrid {
-    let hybrid = Hybrid::new(HybridSettings::paper());
+/// Returns the hybrid before its first move in a cell that is meant to be `nominal`.
+pub(crate) fn new_hybrid(nominal: &TrialCell, goal: Option<&TaughtGoal>) -> Hybrid {
+    let hybrid = Hybrid::new(HybridSettings {
+        nominal: nominal.believed(),
+        ..HybridSettings::paper()
+    });
     match goal {
         Some(goal) => hybrid.shown(goal),
         None => hybrid,
@@ -105,7 +123,8 @@ fn learned(options: &Options) -> Outcome<Vec<(&'static str, Learned)>> {
         "Q 90, exact plane",
         "Q 540, exact plane",
     ];
-    if !NAMES.iter().any(|name| name.contains(&options.only)) {
+    let named = NAMES.iter().any(|name| name.contains(&options.only));
+    if options.arm != ArmName::Puma || !named {
         return Ok(Vec::new());
     }
     let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed_of(options.seed, &[0]));

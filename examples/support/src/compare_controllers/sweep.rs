@@ -53,6 +53,7 @@ pub(crate) struct Settings {
     pub(crate) moves: usize,
     pub(crate) levels: Vec<String>,
     pub(crate) odd: Vec<String>,
+    pub(crate) arm: String,
     pub(crate) grip: bool,
     pub(crate) taught_goal: bool,
     pub(crate) full_chain: bool,
@@ -89,13 +90,19 @@ pub(crate) struct CellRuns {
     runs: Vec<Vec<Run>>,
     /// `true` if the goal could not be shown in the cell.
     pub(crate) unshown: bool,
+    /// `true` if the sensors respond to the ball wherever it shows in the goal.
+    forbidden: bool,
     /// Time that the cell took.
     seconds: f64,
 }
 
 impl CellRuns {
     /// Takes the runs of a cell that was begun at a time.
-    pub(crate) fn new(runs: &[Vec<Counted>], unshown: bool, begun: Instant) -> Self {
+    pub(crate) fn new(
+        runs: &[Vec<Counted>],
+        [unshown, forbidden]: [bool; 2],
+        begun: Instant,
+    ) -> Self {
         let run = |counted: &Counted| Run {
             success: counted.success,
             moves: counted.moves,
@@ -106,6 +113,7 @@ impl CellRuns {
         Self {
             runs: runs.iter().map(of_controller).collect(),
             unshown,
+            forbidden,
             seconds: begun.elapsed().as_secs_f64(),
         }
     }
@@ -312,7 +320,7 @@ impl<'a> Tables<'a> {
             sweep,
             runs: table(
                 "runs.csv",
-                "level,cell,controller,run,success,moves,losses,collisions",
+                "level,cell,controller,run,success,moves,losses,collisions,goal_forbidden",
             )?,
             times: table("times.csv", "level,cell,seconds")?,
             comparison: table("comparison.csv", Row::CSV_HEADER)?,
@@ -332,20 +340,42 @@ impl<'a> Tables<'a> {
                     let collisions = run.collisions.map_or(String::new(), |n| n.to_string());
                     let (success, moves, losses) = (u8::from(run.success), run.moves, run.losses);
                     self.runs.row(format_args!(
-                        "{level},{draw},\"{name}\",{number},{success},{moves},{losses},{collisions}"
+                        "{level},{draw},\"{name}\",{number},{success},{moves},{losses},{collisions},{}",
+                        u8::from(cell.forbidden),
                     ))?;
                 }
             }
             self.times
                 .row(format_args!("{level},{draw},{:.3}", cell.seconds))?;
         }
-        for (controller, name) in controllers.iter().enumerate() {
-            let cells = cells.iter().map(|(_, cell)| cell.counted(controller));
-            let cells = cells.collect();
-            let row = Row::new(level, name, &Tally { cells });
-            say!("{row}");
-            self.comparison.row(row.csv())?;
-            self.rows.push(row);
+        let (forbidden, free): (Vec<_>, Vec<_>) =
+            cells.iter().partition(|(_, cell)| cell.forbidden);
+        let row = |cells: &mut dyn Iterator<Item = &CellRuns>, controller: usize| {
+            let cells = cells.map(|cell| cell.counted(controller)).collect();
+            Row::new(level, &controllers[controller], &Tally { cells })
+        };
+        for controller in 0..controllers.len() {
+            let all = row(&mut cells.iter().map(|(_, cell)| cell), controller);
+            let free = row(&mut free.iter().map(|(_, cell)| cell), controller);
+            say!("{all}");
+            self.comparison.row(all.csv(&free))?;
+            self.rows.push(all);
+        }
+        if !forbidden.is_empty() {
+            let numbers: Vec<_> = forbidden.iter().map(|(draw, _)| draw.to_string()).collect();
+            say!(
+                "{level}: {} of {} cells: the sensors forbid the goal, which lies within the hand \
+                 (cell {}); without them:",
+                numbers.len(),
+                cells.len(),
+                numbers.join(", "),
+            );
+            for controller in 0..controllers.len() {
+                say!(
+                    "{}",
+                    row(&mut free.iter().map(|(_, cell)| cell), controller)
+                );
+            }
         }
         Ok(())
     }

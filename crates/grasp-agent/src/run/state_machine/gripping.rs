@@ -97,7 +97,11 @@ impl Run<'_> {
         self.cycles += 1;
         self.barred_grips += 1;
         if self.barred_grips >= OFTEN {
-            return Ok(State::End(Some(GaveUp::Obstructed)));
+            let reason = match self.short_of_goal >= OFTEN {
+                true => GaveUp::GoalBarred,
+                false => GaveUp::Obstructed,
+            };
+            return Ok(State::End(Some(reason)));
         }
         let ball = self.look()?;
         Ok(ball.map_or(lost(*seen, self.joints), State::Reach))

@@ -97,6 +97,8 @@ pub(crate) struct Run<'a> {
     taken_back: usize,
     /// Moves that were taken back since the search.
     barred: usize,
+    /// Moves of the controller that the sensors stopped since the ball was last at the goal.
+    short_of_goal: usize,
     /// First sighting since the search began.
     first_seen: Option<Sighting>,
     /// `true` if the ball has shown in more than one place of the image since then.
@@ -140,6 +142,7 @@ impl<'a> Run<'a> {
             closed: false,
             taken_back: 0,
             barred: 0,
+            short_of_goal: 0,
             first_seen: None,
             wandered: false,
             barred_grips: 0,
@@ -284,6 +287,7 @@ impl<'a> Run<'a> {
         };
         let mut goal = self.config.goal.iter();
         if goal.all(|interval| interval.holds(&percept)) {
+            self.short_of_goal = 0;
             return self.begin_grip(*ball, true);
         }
         if self.cycles >= self.config.max_cycles {
@@ -305,6 +309,7 @@ impl<'a> Run<'a> {
         }
         self.cycles += 1;
         if self.go_by(delta, EventKind::Moved(delta))? == Went::Back {
+            self.short_of_goal += 1;
             return self.after_taking_back(*ball, from);
         }
         let Some(after) = self.look()? else {
@@ -421,6 +426,7 @@ impl<'a> Run<'a> {
             (self.missed, GaveUp::KeptMissing),
             (self.losses, GaveUp::KeptLosing),
             (self.unsteady, GaveUp::Unsteady),
+            (self.short_of_goal, GaveUp::GoalBarred),
         ];
         let most = counts.into_iter().max_by_key(|(count, _)| *count);
         let kept = self.kept.map_or(0, |(_, since)| self.cycles - since);
