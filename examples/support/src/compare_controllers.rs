@@ -38,9 +38,11 @@ use crate::compare_controllers::sweep::{CellRuns, Settings, Shard, Sweep, Tables
 ///
 /// A run succeeds if the ball's features reach the goal within 60 moves, or the jaws hold the ball
 /// at the end; with --grip, only if they hold it. In some cells with errors the hand itself stands
-/// where the ball would show at the goal; these are named after each level, by their geometry. All controllers have the same search, recovery and limits, and none
-/// turns a joint farther in one move than the paper's behaviours do. The hybrid first learns each
-/// cell by up to --moves moves toward other balls; `hybrid, untaught` does not.
+/// where the ball would show at the goal; these are named after each level, by their geometry.
+///
+/// All controllers have the same search, recovery and limits, and none turns a joint farther in one
+/// move than the paper's behaviours do. The hybrid first learns each cell by up to --moves moves
+/// toward other balls; `hybrid, untaught` does not.
 ///
 /// Every finished cell is kept in cells/ in the folder. Several processes share a sweep by --shard
 /// and a folder each; --resume goes on after a process was killed; --merge makes one result of all.

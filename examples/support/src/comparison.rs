@@ -62,7 +62,7 @@ impl Row {
         }
     }
 
-    /// Returns the row of the file; `free` is that of the cells whose goal the hand does not forbid.
+    /// Returns the row of the file; `free` is that of the cells whose goal is free of the hand.
     pub fn csv(&self, free: &Self) -> String {
         let of = |row: &Self| [row.success, row.interval[0], row.interval[1]];
         let [success, low, high] = of(self).map(|value| number(value, 3));

@@ -339,9 +339,10 @@ impl<'a> Tables<'a> {
                 for (number, run) in runs.iter().enumerate() {
                     let collisions = run.collisions.map_or(String::new(), |n| n.to_string());
                     let (success, moves, losses) = (u8::from(run.success), run.moves, run.losses);
+                    let forbidden = u8::from(cell.forbidden);
                     self.runs.row(format_args!(
-                        "{level},{draw},\"{name}\",{number},{success},{moves},{losses},{collisions},{}",
-                        u8::from(cell.forbidden),
+                        "{level},{draw},\"{name}\",{number},{success},{moves},{losses},\
+                         {collisions},{forbidden}"
                     ))?;
                 }
             }
