@@ -394,7 +394,8 @@ impl Hybrid {
                     .into_iter()
                     .fold(0.0, |most, turn| turn.abs().max(most))
             });
-        let stays = !self.run.doubt && turned < STAYS.0;
+        let whole = !self.run.doubt && self.run.boldness >= 1.0;
+        let stays = whole && turned < STAYS.0;
         self.run.stays = if stays { self.run.stays + 1 } else { 0 };
         if self.run.stays < STAYS.1 {
             return Decision::Move(delta);
